@@ -307,7 +307,7 @@ def allowed(room: str) -> set[str] | None:
 
 
 def python_findings(root: Path) -> Iterator[str]:
-    """Rules between the rooms of the Python package, and between the files of `operations`."""
+    """Rules between the rooms of the Python package, between the files of `operations`, and for `cli/present`."""
     package = root / "python/drivebus"
     for path in sorted(package.rglob("*.py")):
         room, *inside = path.relative_to(package).with_suffix("").parts
@@ -318,6 +318,8 @@ def python_findings(root: Path) -> Iterator[str]:
         for line, [used, *file] in imports(path, package):
             if used != room and used not in may:
                 yield f"{path.relative_to(root)}:{line}: {room} must not import {used}"
+            if room == used == "cli" and inside[0] == "present" and file[:1] != ["present"]:
+                yield f"{path.relative_to(root)}:{line}: present must not import {'.'.join(file)}"
             if room == used == "operations" and inside != ["__init__"] and file:
                 known = [name for name in (inside[0], file[0]) if name not in OPERATIONS]
                 if known:
@@ -480,6 +482,12 @@ BREAKS: list[tuple[str, str | None, str, str]] = [
     ),
     ("python/drivebus/new.py", None, "\nimport drivebus\n", "new.py: where is its place"),
     ("python/drivebus/cli/__init__.py", None, "\nimport drivebus._native\n", "cli must not import _native"),
+    (
+        "python/drivebus/cli/present/motors.py",
+        None,
+        "\nfrom drivebus.cli.session import Session\n",
+        "present must not import session",
+    ),
 ]
 
 

@@ -374,7 +374,7 @@ class TestExitCodes:
         assert "Traceback" not in result.output
 
     def test_every_error_has_one(self) -> None:
-        from drivebus.cli.session import exit_code
+        from drivebus.cli.present.errors import exit_code
 
         codes = {
             drivebus.NotAllowed: 2,

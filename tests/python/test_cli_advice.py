@@ -14,8 +14,8 @@ from click.testing import CliRunner
 
 import drivebus
 from drivebus.advice import Advice, Text, argument, call, joined
-from drivebus.cli.advice import WORDS, in_commands
 from drivebus.cli.app import cli
+from drivebus.cli.present.error_wording import WORDS, in_commands
 
 PACKAGE = Path(__file__).resolve().parent.parent.parent / "python/drivebus"
 PYTHON = re.compile(r"\b[a-z_.]+\(\)|\b[a-z_]+=(?:True|False|…|\{)")

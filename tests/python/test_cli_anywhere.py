@@ -8,8 +8,8 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
-from drivebus.cli.anywhere import in_front
 from drivebus.cli.app import cli
+from drivebus.cli.option_order import in_front
 
 TWO = "sim://1=gd350,2=gd350?clock=virtual"
 

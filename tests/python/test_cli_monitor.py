@@ -19,7 +19,7 @@ from click.testing import CliRunner, Result
 
 import drivebus
 from drivebus.cli import cli
-from drivebus.cli.output import Output
+from drivebus.cli.present.output import Output
 
 from .screens import SIZES, on_a_terminal
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from drivebus.cli.commands import GROUPS
+from drivebus.cli.registry import GROUPS
 
 if sys.platform == "win32":
     pytest.skip("needs a pseudo-terminal", allow_module_level=True)

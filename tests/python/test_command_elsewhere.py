@@ -13,7 +13,7 @@ import pytest
 
 import drivebus
 from drivebus import Bus, Drive, Profile, Simulator
-from drivebus.cli import rules
+from drivebus.cli.present import profile_rules
 
 ACME = Path(__file__).resolve().parents[2] / "crates/sim/tests/profiles/acme"
 ORDER, RESET = 0x9000, 0x9001
@@ -106,6 +106,6 @@ def test_the_rules_say_both_places(profile: Profile) -> None:
         ORDER: {0: "coast", 1: "stop", 0x12: "run_forward", 0x22: "run_reverse", 64: "beep"},
         RESET: {2: "reset_fault"},
     }
-    [lines] = [lines for title, lines in rules.in_words(profile) if title == "Commands"]
+    [lines] = [lines for title, lines in profile_rules.in_words(profile) if title == "Commands"]
     assert lines[-2:] == ["written to 9001H", "  2 reset fault"]
     assert lines[0] == "written to 9000H"

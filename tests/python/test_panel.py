@@ -16,7 +16,7 @@ if sys.platform == "win32":
 
 import drivebus
 from drivebus import Simulator
-from drivebus.cli.panel import paint
+from drivebus.cli.panel import render
 
 from .panels import Terminal, on_a_terminal
 from .screens import SIZES
@@ -232,4 +232,4 @@ class Seen:
     ids=str,
 )
 def test_a_trend_has_a_scale(values: list[float], drawn: str) -> None:
-    assert paint.scaled(Seen(values), "bus_voltage", 19).plain == drawn  # type: ignore[arg-type]
+    assert render.scaled(Seen(values), "bus_voltage", 19).plain == drawn  # type: ignore[arg-type]

@@ -23,9 +23,9 @@ from textual.pilot import Pilot
 
 import drivebus
 from drivebus import Bus, Simulator
-from drivebus.cli.output import Output
 from drivebus.cli.panel import program
 from drivebus.cli.panel.app import Panel
+from drivebus.cli.present.output import Output
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session
 
 from .matrix import ALL

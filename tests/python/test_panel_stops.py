@@ -261,7 +261,7 @@ def put(self, sample):
     if os.path.exists(sampled):
         raise RuntimeError("a mistake in the panel")
     return kept(self, sample)
-import drivebus.cli.panel.fleet as fleet
+import drivebus.cli.panel.members as fleet
 import drivebus.cli.panel.view as view
 shown, view.DriveView.show = view.DriveView.show, broken
 kept, fleet.Member.put = fleet.Member.put, put

@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 
 import drivebus
 from drivebus.cli import cli
-from drivebus.cli.elsewhere import started_by
+from drivebus.cli.halts_elsewhere import started_by
 
 EX9 = Path(__file__).resolve().parent.parent / "vectors/profiles/ex9"
 """A made-up family that takes its commands at 2000H, by 06H or 10H."""

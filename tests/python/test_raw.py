@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 import drivebus
 from drivebus.cli import cli
-from drivebus.cli.output import Output
+from drivebus.cli.present.output import Output
 from drivebus.cli.raw.editing import completions
 from drivebus.cli.raw.families import Families
 from drivebus.cli.raw.request import Request

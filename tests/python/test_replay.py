@@ -19,9 +19,9 @@ from tests.python.test_sniff import LINE, frame, kept, talk
 
 import drivebus
 from drivebus.capture import read
-from drivebus.cli import cli, demo
-from drivebus.cli.output import Output
-from drivebus.cli.replay import Missing
+from drivebus.cli import cli, demonstration
+from drivebus.cli.commands.replay import Missing
+from drivebus.cli.present.output import Output
 from drivebus.sim import Simulator
 from drivebus.sniffer import exchanges_in
 from drivebus.sniffer.replay import Replay
@@ -179,7 +179,7 @@ def test_the_whole_demonstration_gets_the_same_answers_from_its_capture(
     def said_on(bus: drivebus.Bus) -> list[dict[str, object]]:
         """What it shows of the drive; it fails where something is not as it must be."""
         with bus:
-            demo._Job(Output(as_json=True), simulator, bus).whole()
+            demonstration._Job(Output(as_json=True), simulator, bus).whole()
         rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
         # How long it took and how often it asked is the line's business.
         shown = [row for row in rows if "title" not in row and "requests" not in row]

@@ -138,8 +138,8 @@ def test_drivebus_sim_serves_other_programs_or_nobody(monkeypatch: pytest.Monkey
 
 
 def test_the_demonstration_runs_in_its_own_process_if_it_must(monkeypatch: pytest.MonkeyPatch) -> None:
-    from drivebus.cli import demo
-    from drivebus.cli.output import Output
+    from drivebus.cli import demonstration
+    from drivebus.cli.present.output import Output
 
     seen: list[tuple[str, bool]] = []
 
@@ -150,10 +150,10 @@ def test_the_demonstration_runs_in_its_own_process_if_it_must(monkeypatch: pytes
         def whole(self) -> None:
             pass
 
-    monkeypatch.setattr(demo, "_Job", Job)
+    monkeypatch.setattr(demonstration, "_Job", Job)
     for served in (("process",), ("tcp", "process")):
         monkeypatch.setattr(sim, "SERVED", served)
-        demo.run(Output(as_json=True))
+        demonstration.run(Output(as_json=True))
     assert [right for _, right in seen] == [True, True]
     assert seen[0][0] == "process"
 

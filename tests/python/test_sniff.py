@@ -20,7 +20,7 @@ import drivebus
 from drivebus import Exchange
 from drivebus.capture import Captured, Writer, read
 from drivebus.cli import cli
-from drivebus.cli.kept import Kept
+from drivebus.cli.capture_file import Kept
 from drivebus.sim import Simulator
 from drivebus.sniffer import Families, Figures, exchanges_in
 

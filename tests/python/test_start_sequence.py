@@ -20,7 +20,7 @@ import pytest
 import drivebus
 import drivebus.aio
 from drivebus import Bus, Drive, NotAllowed, Profile, Simulator, State, Unconfirmed
-from drivebus.cli import rules
+from drivebus.cli.present import profile_rules
 from drivebus.line.asking import Write
 from drivebus.line.trace import meaning
 
@@ -355,7 +355,7 @@ def test_its_words_are_commands(drive: Drive, profile: Profile) -> None:
     frame = bytes.fromhex("01 06 90 00 00 07")
     frame += drivebus.crc16(frame).to_bytes(2, "little")
     assert meaning(frame, True, None, profile) == "unit 1: write order = 7 (warm up)"
-    [lines] = [lines for title, lines in rules.in_words(profile) if title == "Commands"]
+    [lines] = [lines for title, lines in profile_rules.in_words(profile) if title == "Commands"]
     assert "  3 arm" in lines
     assert lines[-2:] == [
         "before a run or jog from rest: 3 arm, until armed = 1, warm = 0",

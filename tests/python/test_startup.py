@@ -19,7 +19,7 @@ from click.testing import CliRunner
 
 import drivebus
 from drivebus.cli import cli
-from drivebus.cli.commands import GROUPS
+from drivebus.cli.registry import GROUPS
 
 LOADED = "import json, sys; print(json.dumps(sorted(before)), file=sys.stderr)"
 
@@ -115,19 +115,23 @@ def test_a_stop_is_sent_before_anything_is_loaded_that_it_does_not_need() -> Non
         *(
             f"drivebus.cli.{name}"
             for name in (
-                "advice",
-                "anywhere",
                 "app",
-                "choose",
                 "commands",
-                "listing",
-                "crew",
-                "held",
-                "move",
+                "commands.motion",
+                "drive_selection",
                 "names",
-                "output",
+                "option_order",
+                "option_types",
+                "parallel",
+                "present",
+                "present.error_wording",
+                "present.errors",
+                "present.motors",
+                "present.help_format",
+                "present.output",
+                "registry",
                 "session",
-                "types",
+                "suspension",
             )
         ),
     }
@@ -141,8 +145,8 @@ def test_the_table_of_commands_names_those_of_each_file() -> None:
             commands = import_module(f"drivebus.cli.{file}").COMMANDS
             assert names == tuple(command.name for command in commands), file
     folder = Path(import_module("drivebus.cli").__path__[0])
-    places = {path.stem: path for path in folder.glob("*.py")}
-    places |= {path.parent.name: path for path in folder.glob("*/__init__.py")}
+    places = {".".join(path.relative_to(folder).with_suffix("").parts): path for path in folder.rglob("*.py")}
+    places = {name.removesuffix(".__init__"): path for name, path in places.items()}
     with_commands = {name for name, path in places.items() if "\nCOMMANDS = [" in path.read_text(encoding="utf-8")}
     assert with_commands == {file for files in GROUPS.values() for file in files}
 

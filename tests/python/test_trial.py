@@ -16,7 +16,7 @@ from click.testing import CliRunner, Result
 
 import drivebus
 from drivebus.cli import cli
-from drivebus.cli.csv_rows import CsvRows
+from drivebus.cli.present.csv_rows import CsvRows
 
 HIGHEST, RISE, FALL = 0x0003, 0x000B, 0x000C
 """Where a GD350 has P00.03 in hundredths of Hz, and P00.11 and P00.12 in tenths of a second."""

@@ -15,15 +15,16 @@ import click
 
 import drivebus
 from drivebus.advice import Text
-from drivebus.cli.advice import in_commands
-from drivebus.cli.anywhere import in_front
-from drivebus.cli.choose import chosen, complete_drive, complete_port
-from drivebus.cli.commands import GROUPS, Commands
-from drivebus.cli.listing import first_sentence
+from drivebus.cli.drive_selection import chosen, complete_drive, complete_port
 from drivebus.cli.names import complete_profile, complete_variant, parse_variants
-from drivebus.cli.output import Output, laid_out, printable, remark
-from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, exit_code, parse_format, tell
-from drivebus.cli.types import Place, Whole
+from drivebus.cli.option_order import in_front
+from drivebus.cli.option_types import Place, Whole
+from drivebus.cli.present.error_wording import in_commands
+from drivebus.cli.present.errors import exit_code, tell
+from drivebus.cli.present.help_format import first_sentence
+from drivebus.cli.present.output import Output, laid_out, printable, remark
+from drivebus.cli.registry import GROUPS, Commands
+from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, parse_format
 
 __all__ = ["cli", "main"]
 
@@ -262,7 +263,7 @@ def cli(
     if trust_profile and profile is None:
         raise click.UsageError("--trust-profile is for a profile that is named: give --profile too")
     if trace:
-        from drivebus.cli.frames import show_frames
+        from drivebus.cli.present.frames import show_frames
 
         show_frames(context)
     if capture is not None and os.path.exists(capture):  # noqa: PTH110 - pathlib would be loaded for a stop

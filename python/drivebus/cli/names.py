@@ -8,8 +8,8 @@ import click
 from click.shell_completion import CompletionItem
 
 import drivebus
-from drivebus.cli.advice import in_commands
-from drivebus.cli.types import with_a_point
+from drivebus.cli.option_types import with_a_point
+from drivebus.cli.present.error_wording import in_commands
 from drivebus.line.addresses import EVERYBODY, Addresses
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""What every command shares: the options before it, the bus they open, errors as exit codes, and asking first."""
+"""What every command shares: the options before it, the bus they open, and asking first."""
 
 from __future__ import annotations
 
@@ -14,46 +14,30 @@ from typing import IO, TYPE_CHECKING, Any
 import click
 
 import drivebus
-from drivebus.advice import Text
-from drivebus.cli.advice import in_commands
-from drivebus.cli.held import gives_way_when_held
-from drivebus.cli.output import Output, remark
-from drivebus.cli.types import Seconds
+from drivebus.cli.option_types import Seconds
+from drivebus.cli.present.errors import tell_wills
+from drivebus.cli.present.output import Output, remark
+from drivebus.cli.suspension import gives_way_when_held
 from drivebus.line.addresses import Addresses
 from drivebus.site import forget, known_family, remember
 
 if TYPE_CHECKING:
-    from drivebus.cli.crew import Crew
+    from drivebus.cli.parallel import Crew
 
 __all__ = [
     "DEFAULT_BAUD",
     "DEFAULT_FORMAT",
-    "EXIT_CODES",
     "Declined",
     "Session",
     "ask_once",
-    "exit_code",
     "force_option",
     "is_another",
     "may_turn",
     "parse_format",
     "pass_session",
-    "tell",
-    "tell_wills",
     "within_option",
     "yes_option",
 ]
-
-EXIT_CODES: list[tuple[type[drivebus.DrivebusError], int]] = [
-    (drivebus.NotAllowed, 2),
-    (drivebus.NoAnswer, 3),
-    (drivebus.Refused, 4),
-    (drivebus.PortError, 5),
-    (drivebus.BadAnswer, 6),
-    (drivebus.Unconfirmed, 7),
-]
-"""What the process ends with, by whose fault it is; 0 is done, 1 anything else, such as differences found."""
-
 
 DEFAULT_BAUD = 19_200
 DEFAULT_FORMAT = ("8", "E", "1")
@@ -440,21 +424,3 @@ def parse_format(context: click.Context, parameter: click.Parameter, value: str)
             parameter,
         )
     return match[1], match[2], match[3]
-
-
-def exit_code(error: drivebus.DrivebusError) -> int:
-    """What the process ends with after *error*."""
-    return next((code for kind, code in EXIT_CODES if isinstance(error, kind)), 1)
-
-
-def tell_wills(bus: drivebus.Bus) -> None:
-    """Says what was halted on *bus* that nobody here asked for, whatever came of the command."""
-    for done in bus.stats().wills:
-        remark(done)
-
-
-def tell(error: drivebus.DrivebusError, about: str = "") -> None:
-    """Says *error* on standard error; *about* is what it is the error of, where it was one of several."""
-    # Notes say what was done before; Python 3.10 has none.
-    for line in (Text(f"Error: {about + ': ' if about else ''}", error.text), *getattr(error, "__notes__", ())):
-        remark(in_commands(line))

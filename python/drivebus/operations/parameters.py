@@ -124,13 +124,9 @@ def _may_follow(unit: Unit, run: Sequence[Planned], item: Planned) -> bool:
     if not all(_is_plain(unit, each) and key(each.known) not in alone for each in (last, item)):
         return False
     together = {key(each.known) for each in (*run, item)}
-    narrows = any(
-        key(profile.describe(limit.other)) in together for limit in _limits(unit, item.known)
-    )
+    narrows = any(key(profile.describe(limit.other)) in together for limit in _limits(unit, item.known))
     narrowed = any(
-        key(profile.describe(limit.other)) == key(item.known)
-        for each in run
-        for limit in _limits(unit, each.known)
+        key(profile.describe(limit.other)) == key(item.known) for each in run for limit in _limits(unit, each.known)
     )
     return not narrows and not narrowed
 
@@ -259,11 +255,7 @@ def _limits(unit: Unit, known: Description) -> list[_Limit]:
     limits = [_Limit(other, low) for other, low in named if other is not None]
     if known.kind == "parameter":
         have = {unit.profile.describe(limit.other).code for limit in limits}
-        limits += [
-            limit
-            for limit in unit.evidence.once(_narrowing).get(key(known), ())
-            if limit.other not in have
-        ]
+        limits += [limit for limit in unit.evidence.once(_narrowing).get(key(known), ()) if limit.other not in have]
     return limits
 
 
@@ -275,7 +267,5 @@ def _narrowing(evidence: Evidence) -> Mapping[str, Sequence[_Limit]]:
         if other.kind == "parameter":
             for bound, low in ((other.low_from, False), (other.high_from, True)):
                 if bound is not None:
-                    found.setdefault(key(profile.describe(bound)), []).append(
-                        _Limit(key(other), low)
-                    )
+                    found.setdefault(key(profile.describe(bound)), []).append(_Limit(key(other), low))
     return found

@@ -13,9 +13,10 @@ import click
 
 import drivebus
 from drivebus.cli.names import parse_families
-from drivebus.cli.output import remark
-from drivebus.cli.session import Session, exit_code, pass_session
-from drivebus.cli.types import Seconds
+from drivebus.cli.option_types import Seconds
+from drivebus.cli.present.errors import exit_code
+from drivebus.cli.present.output import remark
+from drivebus.cli.session import Session, pass_session
 
 __all__ = ["COMMANDS"]
 

@@ -16,17 +16,17 @@ from textual.driver import Driver
 from textual.screen import ModalScreen
 
 from drivebus import Drive, DrivebusError, NotAllowed
-from drivebus.cli.panel import paint
+from drivebus.cli.panel import render
+from drivebus.cli.panel.bus_control_dialog import lacking, question
 from drivebus.cli.panel.dialogs import Ask, AskFor, Show
-from drivebus.cli.panel.driver import STOP_KEYS, stopping
-from drivebus.cli.panel.fleet import Member
 from drivebus.cli.panel.helping import help_text, journal_text
 from drivebus.cli.panel.journal import Journal
+from drivebus.cli.panel.members import Member
 from drivebus.cli.panel.motors import stop_all
 from drivebus.cli.panel.numbers import number
 from drivebus.cli.panel.overview import Overview
 from drivebus.cli.panel.parameters import Parameters
-from drivebus.cli.panel.preparing import lacking, question
+from drivebus.cli.panel.space_stops import STOP_KEYS, stopping
 from drivebus.cli.panel.view import DriveView, Fleet, View
 
 __all__ = ["Panel"]
@@ -341,7 +341,7 @@ class Panel(App[None]):
     def _ask(self, member: Member, what: str, do: Callable[[int], None], more: str = "") -> None:
         """Says which motor will do *what*, and does it only on yes. A stop meanwhile takes the yes back."""
         since = member.motor.stops
-        now = f"It turns now: {paint.doing(member).plain}. " if paint.turns(member) else ""
+        now = f"It turns now: {render.doing(member).plain}. " if render.turns(member) else ""
         text = f"{member.what}: {what}. {more + ' ' if more else ''}{now}{_CLEAR}"
         self.push_screen(Ask(text, {"y": "yes, go ahead"}), lambda key: do(since) if key == "y" else None)
 
@@ -364,7 +364,7 @@ class Panel(App[None]):
 
     def _setpoint(self, member: Member) -> str:
         name = member.role("setpoint")
-        return "" if name is None else paint.plain_value(member, name)
+        return "" if name is None else render.plain_value(member, name)
 
     def _unknown(self, member: Member) -> None:
         why = f": {member.why}" if member.why else " yet"

@@ -12,8 +12,8 @@ from textual.containers import Vertical, VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
-from drivebus.cli.output import printable
 from drivebus.cli.panel.line_field import LineField
+from drivebus.cli.present.output import printable
 
 __all__ = ["Ask", "AskFor", "Show"]
 

@@ -11,8 +11,8 @@ from datetime import datetime
 from typing import NamedTuple
 
 import drivebus
-from drivebus.cli.advice import in_commands
-from drivebus.cli.output import printable
+from drivebus.cli.present.error_wording import in_commands
+from drivebus.cli.present.output import printable
 
 __all__ = ["LOGGER", "Journal", "Line"]
 

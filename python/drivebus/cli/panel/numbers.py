@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from drivebus import BadArgument
-from drivebus.cli.types import with_a_point
+from drivebus.cli.option_types import with_a_point
 
 __all__ = ["number"]
 

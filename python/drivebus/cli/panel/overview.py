@@ -12,9 +12,9 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
-from drivebus.cli.output import printable
-from drivebus.cli.panel import paint
-from drivebus.cli.panel.fleet import Member
+from drivebus.cli.panel import render
+from drivebus.cli.panel.members import Member
+from drivebus.cli.present.output import printable
 
 __all__ = ["Overview", "summary"]
 
@@ -133,22 +133,22 @@ class Overview(ScrollView, can_focus=True):
         line = Text(f"{printable(member.called):<{named}.{named}}", "bold" if member.motor.started else "")
         roles = [member.role(role) for role in ("frequency", "setpoint")]
         for name in [*roles, *(name for name, _ in columns)]:
-            shown = "" if name is None else paint.value(member, name)
+            shown = "" if name is None else render.value(member, name)
             line.append(f"{shown:>{_NUMBER}}")
         if trends:
-            drawn = paint.scaled(member, roles[0], _TREND) if roles[0] is not None else Text("")
+            drawn = render.scaled(member, roles[0], _TREND) if roles[0] is not None else Text("")
             drawn.pad_right(_TREND - drawn.cell_len)
             line.append("  ").append_text(drawn)
-        line.append("  ").append_text(paint.state(member))
+        line.append("  ").append_text(render.state(member))
         return line
 
 
 def summary(members: Sequence[Member]) -> Text:
     """How many drives there are, and how many of them do what."""
-    turning = sum(paint.turns(member) for member in members)
+    turning = sum(render.turns(member) for member in members)
     started = sum(member.motor.started for member in members)
     silent = sum(member.is_silent for member in members)
-    tripped = sum(paint.tripped(member) for member in members)
+    tripped = sum(render.tripped(member) for member in members)
     told = Text(f"{len(members)} drives", "bold")
     for count, what, style in (
         (turning, "running", "green"),
@@ -158,5 +158,5 @@ def summary(members: Sequence[Member]) -> Text:
     ):
         if count:
             told.append(f", {count} {what}", style)
-    meant = paint.marks(*members)
+    meant = render.marks(*members)
     return told.append(f"  {meant}", "dim") if meant else told

@@ -17,14 +17,14 @@ from textual.screen import Screen
 from textual.widgets import DataTable
 
 import drivebus
-from drivebus.cli.advice import in_commands
 from drivebus.cli.names import evidence
-from drivebus.cli.output import printable
 from drivebus.cli.panel.dialogs import Ask, AskFor, Show
-from drivebus.cli.panel.fleet import Member
 from drivebus.cli.panel.journal import Journal
 from drivebus.cli.panel.line_field import LineField
+from drivebus.cli.panel.members import Member
 from drivebus.cli.panel.view import Piece
+from drivebus.cli.present.error_wording import in_commands
+from drivebus.cli.present.output import printable
 
 __all__ = ["Parameters"]
 

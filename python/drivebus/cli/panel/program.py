@@ -16,11 +16,11 @@ from dataclasses import dataclass, field
 from types import FrameType
 
 import drivebus
-from drivebus.cli.output import remark
 from drivebus.cli.panel.app import Panel
-from drivebus.cli.panel.fleet import Member, opened
 from drivebus.cli.panel.journal import Journal
+from drivebus.cli.panel.members import Member, opened
 from drivebus.cli.panel.motors import stop_all, wait_for_all
+from drivebus.cli.present.output import remark
 from drivebus.cli.session import Session
 from drivebus.cli.signals import ENDS, heeded
 

@@ -13,9 +13,9 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import Screen
 from textual.widgets import Static
 
-from drivebus.cli.panel import paint
-from drivebus.cli.panel.fleet import Member
+from drivebus.cli.panel import render
 from drivebus.cli.panel.journal import Journal
+from drivebus.cli.panel.members import Member
 from drivebus.cli.panel.overview import Overview, summary
 
 __all__ = ["DriveView", "Fleet", "Piece", "View"]
@@ -79,7 +79,7 @@ class View(Screen[None]):
     def show(self) -> None:
         """Shows what is known now."""
         self.query_one("#messages", Piece).put(self._messages())
-        self.query_one("#keys", Piece).put(_keys(paint.tripped(self.shown())))
+        self.query_one("#keys", Piece).put(_keys(render.tripped(self.shown())))
 
     def shown(self) -> Member:
         """The drive that the keys are for."""
@@ -138,8 +138,8 @@ class Fleet(View):
         self.query_one("#head", Piece).put(summary(self._members))
         self.query_one(Overview).show()
         member = self._current()
-        told = paint.head(member).append("  ").append_text(paint.doing(member))
-        more = paint.fault(member)
+        told = render.head(member).append("  ").append_text(render.doing(member))
+        more = render.fault(member)
         self.query_one("#chosen", Piece).put(told.append("\n").append_text(more) if more else told)
         super().show()
 
@@ -197,23 +197,23 @@ class DriveView(View):
     def show(self) -> None:
         """Shows what is known now."""
         member = self.member
-        head = paint.head(member)
+        head = render.head(member)
         if len(self._members) > 1:
             head.append(f"  {self._members.index(member) + 1} of {len(self._members)}", "dim")
-        if meant := paint.marks(member):
+        if meant := render.marks(member):
             head.append(f"  {meant}", "dim")
         self.query_one("#head", Piece).put(head)
-        self.query_one("#doing", Piece).put(paint.doing(member))
-        names = paint.tiles(member, min(max(self.size.width // (_TILE + 1), 1), _MOST_TILES))
+        self.query_one("#doing", Piece).put(render.doing(member))
+        names = render.tiles(member, min(max(self.size.width // (_TILE + 1), 1), _MOST_TILES))
         self._show_tiles(names)
         values = self.query_one("#values", Piece)
-        values.put(paint.values(member, names, values.size.width, values.size.height, self._page))
-        self.query_one("#lamps", Piece).put(Text("\n").join(paint.lamps(member)))
+        values.put(render.values(member, names, values.size.width, values.size.height, self._page))
+        self.query_one("#lamps", Piece).put(Text("\n").join(render.lamps(member)))
         fault = self.query_one("#fault", Piece)
-        told = paint.fault(member)
+        told = render.fault(member)
         fault.display = bool(told)
         fault.put(told)
-        self.query_one("#line", Piece).put(paint.line(member))
+        self.query_one("#line", Piece).put(render.line(member))
         super().show()
 
     def _show_tiles(self, names: Sequence[str]) -> None:
@@ -223,9 +223,9 @@ class DriveView(View):
             if place >= len(names):
                 continue
             name, width = names[place], max(tile.size.width - 1, 1)
-            drawn = paint.scaled(self.member, name, width).plain
-            key = (name, paint.value(self.member, name), drawn, self.member.highest)
-            tile.put(paint.big(self.member, name, width), key)
+            drawn = render.scaled(self.member, name, width).plain
+            key = (name, render.value(self.member, name), drawn, self.member.highest)
+            tile.put(render.big(self.member, name, width), key)
 
 
 def _keys(is_tripped: bool) -> Text:

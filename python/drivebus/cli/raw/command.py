@@ -9,13 +9,14 @@ from dataclasses import replace
 import click
 
 import drivebus
-from drivebus.cli.output import remark
+from drivebus.cli.option_types import Place, Seconds, Whole
+from drivebus.cli.present.errors import exit_code
+from drivebus.cli.present.output import remark
 from drivebus.cli.raw.families import Families
 from drivebus.cli.raw.request import request_of
 from drivebus.cli.raw.script import Send, Step, Typed, requests_of, typed_in
 from drivebus.cli.raw.sending import Sender
-from drivebus.cli.session import Session, exit_code, pass_session, yes_option
-from drivebus.cli.types import Place, Seconds, Whole
+from drivebus.cli.session import Session, pass_session, yes_option
 
 __all__ = ["raw"]
 

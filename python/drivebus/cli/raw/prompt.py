@@ -5,12 +5,13 @@ from __future__ import annotations
 import click
 
 import drivebus
-from drivebus.cli.output import remark
+from drivebus.cli.present.errors import tell
+from drivebus.cli.present.output import remark
 from drivebus.cli.raw.editing import Editing
 from drivebus.cli.raw.families import Families
 from drivebus.cli.raw.script import Send, requests_of, typed_in
 from drivebus.cli.raw.sending import Sender
-from drivebus.cli.session import Declined, Session, tell
+from drivebus.cli.session import Declined, Session
 
 __all__ = ["prompt"]
 

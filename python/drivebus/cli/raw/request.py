@@ -9,7 +9,7 @@ import click
 import drivebus
 from drivebus import tables
 from drivebus.cli import names
-from drivebus.cli.advice import in_commands
+from drivebus.cli.present.error_wording import in_commands
 from drivebus.line.addresses import Addresses
 from drivebus.line.trace import meaning
 from drivebus.rtu import framed

@@ -16,8 +16,8 @@ import click
 import drivebus
 from drivebus.advice import Text
 from drivebus.cli import names
+from drivebus.cli.option_types import with_a_point
 from drivebus.cli.raw.request import Request, request_of
-from drivebus.cli.types import with_a_point
 from drivebus.line.addresses import EVERYBODY, Addresses
 
 __all__ = ["VERBS", "Send", "Step", "Typed", "Wait", "located", "requests_of", "typed_in"]

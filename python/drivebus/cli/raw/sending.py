@@ -6,12 +6,13 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import drivebus
-from drivebus.cli.frames import show_frame
-from drivebus.cli.output import remark
+from drivebus.cli.present.errors import tell
+from drivebus.cli.present.frames import show_frame
+from drivebus.cli.present.output import remark
 from drivebus.cli.raw.families import Families
 from drivebus.cli.raw.request import Request
 from drivebus.cli.raw.script import Send, Step, Wait, located
-from drivebus.cli.session import Session, ask_once, tell
+from drivebus.cli.session import Session, ask_once
 from drivebus.rtu import framed
 
 __all__ = ["Sender"]

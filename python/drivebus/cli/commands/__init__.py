@@ -1,0 +1,1 @@
+"""The commands, a file for each kind: what one types, and which results it gives. `registry` names them."""

@@ -1,0 +1,135 @@
+"""`drivebus doctor`: what `drivebus.doctor` finds, as it finds it, and an exit code by the worst of it."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from contextlib import closing, nullcontext
+from time import monotonic
+from typing import Any
+
+import click
+from click.core import ParameterSource
+from rich.status import Status
+
+import drivebus
+from drivebus.cli.option_types import Seconds, Whole
+from drivebus.cli.present.error_wording import in_commands
+from drivebus.cli.present.errors import EXIT_CODES
+from drivebus.cli.present.output import Output, counted, show
+from drivebus.cli.session import Session, parse_format, pass_session
+
+__all__ = ["COMMANDS"]
+
+_SIGNS = {"ok": "ok", "note": "note", "warning": "WARNING", "fault": "FAULT"}
+_STYLES = {"ok": "green", "note": "", "warning": "bold yellow", "fault": "bold red"}
+
+
+@click.command()
+@click.argument("port", required=False)
+@click.option("--unit", "-u", type=Whole(0, 255), help="Only this one.  [default: whoever answers]")
+@click.option("--baud", "-b", type=Whole(1), help="Bits per second it should be.  [default: 19200]")
+@click.option(
+    "--format",
+    "line_format",
+    "-f",
+    metavar="8E1",
+    callback=lambda context, parameter, value: value and parse_format(context, parameter, value),
+    help="Data bits, parity and stop bits it should be.  [default: 8E1]",
+)
+@click.option(
+    "--full", is_flag=True, help="Try every address, baud rate and format, with ten times the echoes. Takes minutes."
+)
+@click.option(
+    "--listen", type=Seconds(0, 3600), default=1.0, show_default=True, help="Seconds to listen before asking."
+)
+@pass_session
+@click.pass_context
+def doctor(
+    context: click.Context,
+    session: Session,
+    port: str | None,
+    unit: int | None,
+    baud: int | None,
+    line_format: tuple[str, str, str] | None,
+    full: bool,
+    listen: float,
+) -> None:
+    """Find what is wrong with an adapter, a line and its units, and say what to do. Only reads.
+
+    Without --unit, addresses 1 to 32 are asked. If nobody answers, other baud rates and parities are tried. With
+    --profile, units that do not identify themselves are examined as that family.
+    """
+    port = port or session.port
+    if port is None:
+        raise click.UsageError("no port: give it, as in `drivebus doctor /dev/ttyUSB0`; `drivebus ports` lists them")
+    if unit is None and context.find_root().get_parameter_source("unit") is not ParameterSource.DEFAULT:
+        unit = session.unit
+    bits, parity, stop = line_format or session.line_format
+    out = session.out
+    wrong: list[drivebus.doctor.Finding] = []
+    began = monotonic()
+    with Status("", console=out.console) if out.live else nullcontext() as status:
+        findings = drivebus.doctor.examine(
+            port,
+            unit,
+            baudrate=baud or session.baud,
+            bytesize=int(bits),
+            parity=parity,
+            stopbits=int(stop),
+            full=full,
+            listen=listen,
+            rs485=session.direction,
+            profile=session.profile,
+            unverified=session.unverified,
+            reserved=session.reserved,
+            tell=(lambda text: status.update(show(text))) if status is not None else None,
+        )
+        # Closing it closes the port, also where Ctrl-C or a full pipe ends this.
+        with closing(findings):
+            for finding in findings:
+                _show(out, finding, port)
+                if finding.wrong:
+                    wrong.append(finding)
+    took = f"Took {monotonic() - began:.0f} s."
+    if not wrong:
+        out.say(f"Nothing is wrong. {took}")
+        return
+    counts = [(name, sum(finding.severity == name for finding in wrong)) for name in ("fault", "warning")]
+    found = ", ".join(counted(count, name) for name, count in counts if count)
+    out.say(f"{found}. {took}")
+    # The first of the worst.
+    context.exit(_exit_code(max(wrong, key=lambda finding: finding.severity.rank)))
+
+
+def _show(out: Output, finding: drivebus.doctor.Finding, port: str) -> None:
+    # What it says to type is for this port, unless the environment has it.
+    here = "`drivebus " if os.environ.get("DRIVEBUS_PORT") == port else f"`drivebus --port {shlex.quote(port)} "
+    text, advice = (in_commands(said).replace("`drivebus ", here) for said in (finding.text, finding.advice))
+    if out.as_json:
+        fields: dict[str, Any] = {
+            "step": finding.step,
+            "name": finding.name,
+            "severity": finding.severity,
+            "unit": finding.unit,
+            "text": text,
+            "advice": advice,
+            "values": finding.values,
+            "exit_code": _exit_code(finding),
+        }
+        out.record(fields)
+        return
+    style = _STYLES[finding.severity.value]
+    out.say(f"{_SIGNS[finding.severity.value]:<8} {text}", style, hanging=9)
+    if advice:
+        out.say(f"{'':<8} -> {advice}", hanging=3)
+
+
+def _exit_code(finding: drivebus.doctor.Finding) -> int:
+    """What the process ends with if *finding* is the worst: that of the error which calls end with because of it."""
+    if not finding.wrong or finding.error is None:
+        return 0
+    return next((code for kind, code in EXIT_CODES if issubclass(finding.error, kind)), 1)
+
+
+COMMANDS = [doctor]

@@ -1,0 +1,77 @@
+"""`drivebus plot`: recordings as pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from drivebus.cli.option_types import Place, Seconds, Whole
+from drivebus.cli.present.output import counted, remark
+from drivebus.cli.session import Session, pass_session
+from drivebus.plot import draw, of_recording
+from drivebus.plot.draw import check
+from drivebus.record import read
+
+__all__ = ["COMMANDS"]
+
+
+@click.command()
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=Place())
+@click.option("--output", "-o", "target", type=Place(), metavar="PICTURE", help="Default: FILE with .png.")
+@click.option("--only", "names", multiple=True, metavar="NAME", help="Draw this register only. Repeatable.")
+@click.option("--from", "begin", type=Seconds(0), default=0.0, metavar="SECONDS", help="Begin so long after the start.")
+@click.option("--to", "end", type=Seconds(0), metavar="SECONDS", help="End so long after the start.")
+@click.option(
+    "--points", type=Whole(10, 1_000_000), default=4000, show_default=True, help="Most points of a curve. Peaks stay."
+)
+@click.option("--force", is_flag=True, help="Replace the picture if it is there.")
+@pass_session
+def plot(
+    session: Session,
+    files: tuple[str, ...],
+    target: str | None,
+    names: tuple[str, ...],
+    begin: float,
+    end: float | None,
+    points: int,
+    force: bool,
+) -> None:
+    """Draw a recording: values by unit under each other, states as bands, faults and gaps marked.
+
+    Several files of one recording are drawn as one. PICTURE ends with .png, .svg or .html. The page works without a
+    network.
+    """
+    picture_file = Path(files[0]).with_suffix(".png") if target is None else Path(target)
+    check(picture_file)
+    if picture_file.exists() and not force:
+        raise click.UsageError(f"{picture_file} is there already; give another name by -o, or --force")
+    recording = read(*files)
+    picture = of_recording(recording, Path(files[0]).name, names, begin=begin, end=end, points=points)
+    draw(picture, picture_file)
+    if session.out.as_json:
+        session.out.record(
+            {
+                "picture": str(picture_file),
+                "complete": recording.complete,
+                "left_out": picture.left_out,
+                "curves": sum(map(len, picture.panels.values())),
+            }
+        )
+        return
+    bits = len({band.drive for band in picture.bands if band.lamp})
+    lamps = f" and {bits} bit{'' if bits == 1 else 's'}" if bits else ""
+    session.out.say(f"{counted(sum(map(len, picture.panels.values())), 'curve')}{lamps} in {picture_file}.")
+    if picture.late:
+        times = "1 time" if picture.late == 1 else f"{picture.late} times"
+        remark(
+            f"The line was busy {times}, so samples are missing there: a curve goes straight to the next "
+            "sample, and a band begins with it."
+        )
+    if picture.left_out:
+        remark(f"Left out, because they were 0 all the time: {', '.join(picture.left_out)}. --only NAME draws them.")
+    if not recording.complete:
+        remark("The recording has no end: it is still written, or was cut off.")
+
+
+COMMANDS = [plot]
