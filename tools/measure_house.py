@@ -53,7 +53,7 @@ def main() -> int:
     """The command."""
     sys.setrecursionlimit(10_000)
     python = modules()
-    private = Counter(name for path in PACKAGE.rglob("*.py") for _, name in borrowed(path))
+    private = Counter(name for path in PACKAGE.rglob("*.py") for _, name in borrowed(path.read_text(encoding="utf-8")))
     towers = {f"{path.relative_to(PACKAGE)}: {name}": depth for path, name, depth in ancestors(PACKAGE)}
     deepest = max(towers, key=lambda name: towers[name])
     lines = {path: len(ast.unparse(ast.parse(path.read_text("utf-8"))).splitlines()) for path in PACKAGE.rglob("*.py")}
