@@ -55,7 +55,7 @@ def found() -> Iterator[str]:
 
 
 def test_a_command_that_goes_out_twice_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(commands, "send_whole", _sent_twice(commands.send_whole))
+    monkeypatch.setattr(commands, "send", _sent_twice(commands.send))
     assert any("a command went out twice" in said for said in found())
 
 

@@ -131,7 +131,7 @@ async def _set_bits(unit: Unit, setpoint: str, given: Mapping[str, object], forc
         await raw_words.write(unit, address, word, read_back=unit.profile.read_back(register))
         return
     unit.record.started_unverified |= unit.unverified
-    await commands.send_once(unit, A_WORD, address, word)
+    await commands.send_word(unit, A_WORD, address, word)
 
 
 def _masks(unit: Unit, name: str) -> dict[str, int]:

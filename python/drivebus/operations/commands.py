@@ -7,7 +7,7 @@ number is looked at.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 from drivebus import tables
 from drivebus.errors import (
@@ -34,10 +34,9 @@ __all__ = [
     "Proof",
     "confirm",
     "frames_of",
-    "give",
     "prepared",
-    "send_once",
-    "send_whole",
+    "send",
+    "send_word",
     "state_afterwards",
 ]
 
@@ -70,12 +69,11 @@ of a fault shall not depend on a name. It has shown that fault in the words of t
 of another family gets none: that word may start its motor."""
 
 
-async def give(unit: Unit, name: str) -> None:
-    """Sends the command word once, after what comes before it."""
-    await send_whole(unit, name, *unit.profile.command(name))
+Words: TypeAlias = tuple[int, int | Sequence[int]]
+"""An address, and the word or words that go there."""
 
 
-async def prepared(unit: Unit, name: str, setpoint: int | None) -> tuple[int, int | list[int]]:
+async def prepared(unit: Unit, name: str, setpoint: int | None) -> Words:
     """Where the command goes, and what goes there: the setpoint behind it, where the drive has both side by side.
 
     Where it has not, the setpoint is sent now.
@@ -89,14 +87,21 @@ async def prepared(unit: Unit, name: str, setpoint: int | None) -> tuple[int, in
     return address, code
 
 
-async def send_whole(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
-    """Sends a command, once. Where another word says which way the motor turns, that goes out first, once too."""
+async def send(unit: Unit, name: str, words: Words | None = None) -> None:
+    """Sends a command, once. Where another word says which way the motor turns, that goes out first, once too.
+
+    Args:
+        unit: Who gets it.
+        name: What it is called.
+        words: Where it goes and what goes there, as `prepared` has it; None is what the profile says.
+    """
+    address, payload = unit.profile.command(name) if words is None else words
     first = unit.profile.command_first(name)
     if first is None:
-        await send_once(unit, name, address, payload)
+        await send_word(unit, name, address, payload)
         return
     before = unit.record.halts_begun
-    await send_once(unit, name, *first)
+    await send_word(unit, name, *first)
     halted = Unconfirmed(
         f"unit {unit.address} was told to stop when {first[1]} had been sent to {tables.shown(first[0])}, "
         f"which comes before {name}; the rest of {name} was not sent",
@@ -105,12 +110,12 @@ async def send_whole(unit: Unit, name: str, address: int, payload: int | Sequenc
     if unit.record.halts_begun != before:
         raise halted
     try:
-        await send_once(unit, name, address, payload)
+        await send_word(unit, name, address, payload)
     except NotReady as error:
         raise halted from error
 
 
-async def send_once(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
+async def send_word(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
     """Sends what may move the motor, once. Where nothing is known of it afterwards, that is said."""
     try:
         await raw_words.write(unit, address, payload, judged=name not in _WHATEVER_IT_IS)

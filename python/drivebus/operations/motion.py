@@ -216,7 +216,7 @@ async def reset_fault(unit: Unit, *, confirm: float = 1.0, unverified: bool = Fa
         return not seen.tripped and ("state" in seen.missing or seen.state is not State.UNKNOWN)
 
     await check_harmless(unit, "reset_fault")
-    await commands.give(unit, "reset_fault")
+    await commands.send(unit, "reset_fault")
     await commands.confirm(unit, "reset_fault", shows, confirm)
 
 
@@ -231,10 +231,10 @@ async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, 
     unit.record.starts += 1
     unit.record.started_under = unit.profile
     unit.record.started_as = State.UNKNOWN if command.startswith("jog") else wanted
-    address, payload = await commands.prepared(unit, command, setpoint)
+    prepared = await commands.prepared(unit, command, setpoint)
     if not before.state.running:
         await start_sequence.lead_up(unit, command, confirm)
-    await commands.send_whole(unit, command, address, payload)
+    await commands.send(unit, command, prepared)
 
     async def shows(seen: Look) -> bool:
         if "state" in seen.missing:
