@@ -176,23 +176,8 @@ class Apart:
         return not any(self._speaks_against(profile, answer) for answer in self._answers.values())
 
     def _speaks_against(self, profile: Profile, answer: Answer) -> bool:
-        place, word = answer.address, answer.word
-        if word is None:
-            exception = answer.exception or 0
-            known = profile.exceptions()
-            if known and exception not in known and exception not in _SPECIFIED:
-                # In the words of another maker.
-                return True
-            lacks = no_such_address(profile, exception) or (place >> 16 and exception == NO_FUNCTION)
-            return bool(lacks) and place in _answered(profile)
-        if place in _refused(profile):
-            return True
-        if place == _state_place(profile) and profile.state(word) == "unknown":
-            return profile.state_reason() is None or not self._reports(profile)
-        rows = codes.listed_for(profile, place, word)
-        if not rows or codes.are_own(profile, rows):
-            return False
-        return place == codes.address_of(profile) or profile.name_at(place) is None
+        against = _speaks_against(profile, answer)
+        return not self._reports(profile) if against is None else against
 
     def _is_shown(self, profile: Profile) -> bool:
         """Whether its code came, or its whole signature, or where it has neither, one of its states."""
@@ -237,6 +222,28 @@ class Apart:
         rated = [(_apart(one, other, place), place) for place in places if place not in self._answers]
         best, place = max(rated, key=lambda each: each[0], default=(0, None))
         return place if best > 0 else None
+
+
+@functools.lru_cache(maxsize=4096)
+def _speaks_against(profile: Profile, answer: Answer) -> bool | None:
+    """Whether *answer* alone speaks against *profile*; None where it does unless the unit gave a code of its family."""
+    place, word = answer.address, answer.word
+    if word is None:
+        exception = answer.exception or 0
+        known = profile.exceptions()
+        if known and exception not in known and exception not in _SPECIFIED:
+            # In the words of another maker.
+            return True
+        lacks = no_such_address(profile, exception) or (place >> 16 and exception == NO_FUNCTION)
+        return bool(lacks) and place in _answered(profile)
+    if place in _refused(profile):
+        return True
+    if place == _state_place(profile) and profile.state(word) == "unknown":
+        return True if profile.state_reason() is None else None
+    rows = codes.listed_for(profile, place, word)
+    if not rows or codes.are_own(profile, rows):
+        return False
+    return place == codes.address_of(profile) or profile.name_at(place) is None
 
 
 def _apart(one: Profile, other: Profile, place: int) -> int:

@@ -56,6 +56,7 @@ def are_own(profile: Profile, rows: Iterable[IdentificationCode]) -> bool:
     return not set(families_in(rows)).isdisjoint(profile.reports_as())
 
 
+@functools.lru_cache(maxsize=256)
 def is_listed(profile: Profile) -> bool:
     """Whether *profile* or a shipped one lists a code of the family of *profile*."""
     rows = [*profile.identifications(), *(row for rows in listed().values() for row in rows)]
