@@ -1,6 +1,6 @@
 """The panel as a program: its keys, its beat, and what it asks before anything moves.
 
-It calls nothing that blocks. What is asked of a drive runs in threads (`motors`, `fleet`); what they have to say is
+It calls nothing that blocks. What is asked of a drive runs in threads (`motors`, `members`); what they have to say is
 shown four times a second.
 """
 
