@@ -185,7 +185,7 @@ fn a_poll_goes_on_when_the_port_changes_hands() {
     let mut after = 0;
     while after < 5 {
         poll.wait(1, None, &mut || false).unwrap();
-        after += poll.take(10).iter().filter(|(sample, _)| sample.missing.is_none() && guest.reconnects() == 1).count();
+        after += poll.take(10).iter().filter(|(sample, _)| sample.missing.is_none() && guest.reconnects() >= 1).count();
     }
     assert_eq!(identify(&open(&served)).unwrap(), [GD350]);
 }
