@@ -188,7 +188,7 @@ def test_what_is_missing_is_named(recording: Recording, tmp_path: Path, monkeypa
         draw(picture, tmp_path / "run.gif")
     with pytest.raises(NotAllowed, match="cannot be written: No such file"):
         draw(picture, tmp_path / "nowhere" / "run.png")
-    for module, library, ending in [("page", "plotly", "html"), ("still", "matplotlib", "png")]:
+    for module, library, ending in [("plotly_writer", "plotly", "html"), ("matplotlib_writer", "matplotlib", "png")]:
         monkeypatch.delitem(sys.modules, f"drivebus.plot.{module}", raising=False)
         for name in [name for name in sys.modules if name.split(".")[0] == library]:
             monkeypatch.setitem(sys.modules, name, None)
