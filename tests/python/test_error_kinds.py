@@ -5,8 +5,10 @@ from __future__ import annotations
 import contextlib
 import copy
 import pickle
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -23,7 +25,9 @@ from drivebus import (
     Unverified,
     WrongDrive,
 )
+from drivebus.errors import Why
 
+ROOT = Path(__file__).resolve().parents[2]
 KINDS = (BadArgument, BadLink, NotReady, QueueFull, Unverified, WrongDrive)
 
 
@@ -143,3 +147,11 @@ def test_they_can_be_copied_and_sent_to_another_process(kind: type[NotAllowed]) 
         error.why = "fault"
     for same in (copy.copy(error), pickle.loads(pickle.dumps(error))):
         assert (type(same), str(same), vars(same)) == (kind, "no", vars(error))
+
+
+def test_the_reasons_of_not_ready_stand_alike_in_its_type_its_docstring_and_the_page() -> None:
+    reasons = {word for word in get_args(Why) if word}
+    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    [row] = [line for line in page.splitlines() if line.startswith("| `NotReady` |")]
+    for text in (row, drivebus.NotReady.__doc__ or ""):
+        assert set(re.findall(r'"([a-z_]+)"', text)) == reasons

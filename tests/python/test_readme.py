@@ -36,7 +36,10 @@ def blocks() -> list[object]:
 
 
 @pytest.mark.parametrize("block", blocks())
-def test_python_blocks_run(block: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_python_blocks_run(
+    block: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     try:
         exec(compile(PORT.sub('"sim://gd350?clock=virtual"', block), "<page>", "exec"), {"__name__": "page"})
     finally:

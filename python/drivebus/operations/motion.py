@@ -8,8 +8,8 @@ caller is told so.
 from __future__ import annotations
 
 from drivebus import checks
-from drivebus.advice import Advice, Text, call
-from drivebus.errors import BadArgument, NotReady, Unconfirmed
+from drivebus.advice import Text, call
+from drivebus.errors import BadArgument, Unconfirmed
 from drivebus.look import Look
 from drivebus.operations import bus_control, commands, setpoints, speed, start_checks, start_sequence, state
 from drivebus.operations.aim import check_harmless
@@ -105,16 +105,7 @@ async def jog(
     unit = await unit.unless_halted()
     await start_checks.prove_link(unit, force)
     before = await start_checks.ready_to_start(unit)
-    if before.state.running:
-        raise NotReady(
-            Text(
-                f"unit {unit.address} turns already ({before.state}); nothing that moves it was sent. ",
-                Advice("stop_and_wait", None, "stop() it, and wait_until_stopped(),"),
-                " before a jog",
-            ),
-            why="turning",
-            unit=unit.address,
-        )
+    start_checks.check_at_rest(unit, before)
     await _start(unit, command, None, reverse, before, confirm)
 
 

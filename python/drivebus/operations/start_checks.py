@@ -1,4 +1,9 @@
-"""What is checked before a motor is started: the link, the drive, and that it can be stopped again."""
+"""What is checked before a motor is started: the link, the drive, and that it can be stopped again.
+
+Every start goes through here, whatever asks for it: `motion` for run and jog, of both faces, of the command line, the
+panel and HAL; `bit_words` for bits that may start one. A new reason against a start is a check in `ready_to_start`, its
+word in `errors.Why`, and a line in docs/safety.md.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +15,7 @@ from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
 from drivebus.values import ControlSource, State
 
-__all__ = ["can_be_stopped", "may_be_given", "prove_link", "ready_to_start"]
+__all__ = ["can_be_stopped", "check_at_rest", "may_be_given", "prove_link", "ready_to_start"]
 
 _FAILURES_ALLOWED = 1
 """Of the last ten exchanges with a unit. One answer in ten may be lost on a line that works, to a burst of noise. Where
@@ -99,6 +104,20 @@ async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Look:
         left = [row for row in bus_control.wanted_of_commands(unit) if not row.always]
         await bus_control.check_set(unit, left, "does not take its commands from the bus")
     return seen
+
+
+def check_at_rest(unit: Unit, seen: Look) -> None:
+    """Raises `NotAllowed` where the motor turns already: a jog could not be told from what it does."""
+    if seen.state.running:
+        raise NotReady(
+            Text(
+                f"unit {unit.address} turns already ({seen.state}); nothing that moves it was sent. ",
+                Advice("stop_and_wait", None, "stop() it, and wait_until_stopped(),"),
+                " before a jog",
+            ),
+            why="turning",
+            unit=unit.address,
+        )
 
 
 def _both_unusable(evidence: Evidence) -> str | None:
