@@ -75,7 +75,9 @@ class Drive(BlockingFormerNames):
     ) -> None:
         self.bus = bus
         super().__init__(
-            Unit.at(BlockingBus(bus), unit, profile, identification, unverified=unverified, trust_profile=trust_profile)
+            Unit.create(
+                BlockingBus(bus), unit, profile, identification, unverified=unverified, trust_profile=trust_profile
+            )
         )
 
     # Names that are also rooms come after what is taken from the room.

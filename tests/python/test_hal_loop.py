@@ -13,7 +13,7 @@ import pytest
 
 import drivebus
 from drivebus import Bus, Drive, Simulator
-from drivebus.hal import PINS, Alive, HalGone, Loop, Motor, Pins, Scale, Spindle, module
+from drivebus.hal import PINS, Alive, HalGone, Loop, Pins, Scale, Spindle, SpindleMotor, module
 from drivebus.hal.core import Action
 from drivebus.hal.loop import Watch
 
@@ -32,7 +32,7 @@ class Cell:
         self.pins: dict[str, bool | float] = {name: kind == "FLOAT" and 0.0 for name, (kind, _) in PINS.items()}
         self.said: list[str] = []
         self.simulator, self.machine = simulator, simulator.drive(1)
-        self.motor = Motor(drive, watchdog, self.said.append)
+        self.motor = SpindleMotor(drive, watchdog, self.said.append)
         self.spindle = Spindle(Scale(60.0))
         self.watch = watch
         self.loop = Loop(Pins(self.pins), self.spindle, self.motor, drive, self.said.append, watch)

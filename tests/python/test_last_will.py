@@ -408,7 +408,7 @@ def test_what_is_left_halts_each_family(family: str) -> None:
             line = Line()
 
         profile = drivebus.Profile.find(family)
-        unit = Unit.at(Face(bus), 1, profile, None, unverified=True, trust_profile=True)
+        unit = Unit.create(Face(bus), 1, profile, None, unverified=True, trust_profile=True)
         LastWill(unit).leave()
         wanted = [way for way in ("stop", "coast") if way in profile.commands()]
         assert len(left[0] if left else []) == len(wanted)

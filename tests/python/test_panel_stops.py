@@ -23,7 +23,7 @@ import drivebus
 from drivebus import Simulator
 from drivebus.cli.panel.app import Panel
 from drivebus.cli.panel.journal import Journal
-from drivebus.cli.panel.motors import Motor
+from drivebus.cli.panel.motors import PanelMotor
 
 from .panels import Terminal, on_a_terminal
 
@@ -217,7 +217,7 @@ def test_stops_leave_a_start_room_to_end() -> None:
         if sum(sent.values()) >= 8:
             plenty.set()
 
-    motor = Motor("unit 1", halt, lambda: "", Journal(), None)
+    motor = PanelMotor("unit 1", halt, lambda: "", Journal(), None)
     under_way = threading.Event()
 
     def order() -> None:
@@ -237,7 +237,7 @@ def test_space_stops_all_though_the_cursor_moves_meanwhile() -> None:
     told: list[str] = []
     panel: Panel
 
-    class Moved(Motor):
+    class Moved(PanelMotor):
         started = True
 
         def stop(self) -> None:

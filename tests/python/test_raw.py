@@ -21,7 +21,7 @@ import drivebus
 from drivebus.cli import cli
 from drivebus.cli.present.output import Output
 from drivebus.cli.raw.editing import completions
-from drivebus.cli.raw.families import Families
+from drivebus.cli.raw.families import UnitFamilies
 from drivebus.cli.raw.request import Request
 from drivebus.cli.raw.script import requests_of, typed_in
 from drivebus.cli.raw.sending import Sender
@@ -180,7 +180,7 @@ def test_repetitions_begin_when_they_are_said_to() -> None:
         drivebus.Bus(simulator) as bus,
     ):
         session = Session(simulator.port, 19200, ("8", "E", "1"), 1, "gd350", Output(True))
-        families = Families(session, bus)
+        families = UnitFamilies(session, bus)
         sender = Sender(session, bus, families, force=False, yes=True)
         text = ["write set_frequency=10 x3 every 0.5", "wait 2"]
         steps = [step for line in typed_in(text, "", 1, False) if (step := requests_of(line, families.find))]

@@ -20,7 +20,7 @@ import drivebus
 from drivebus import Exchange
 from drivebus.capture import Captured, Writer, read
 from drivebus.cli import cli
-from drivebus.cli.capture_file import Kept
+from drivebus.cli.capture_file import CaptureFile
 from drivebus.sim import Simulator
 from drivebus.sniffer import Families, Figures, exchanges_in
 
@@ -330,7 +330,7 @@ def test_a_capture_whose_file_is_removed_says_so(
     """It is looked at once a second of the line's time, and in the end; what stands there now is not touched."""
     frames = list(read(capture))[:2]
     path = tmp_path / "heard.pcapng"
-    with Kept(str(path), False, "port", "9600 8N1", "upper") as kept:
+    with CaptureFile(str(path), False, "port", "9600 8N1", "upper") as kept:
         kept.write(replace(frames[0], time=100.0))
         path.unlink()
         kept.write(replace(frames[1], time=100.9))
@@ -340,7 +340,7 @@ def test_a_capture_whose_file_is_removed_says_so(
         path.write_text("mine")
     assert path.read_text() == "mine"
     assert capsys.readouterr().err.count("heard.pcapng was not there any more: it was removed") == 1
-    with Kept(str(tmp_path / "new.pcapng"), False, "port", "9600 8N1", "upper") as kept:
+    with CaptureFile(str(tmp_path / "new.pcapng"), False, "port", "9600 8N1", "upper") as kept:
         (tmp_path / "new.pcapng").rename(tmp_path / "old.pcapng")
         (tmp_path / "new.pcapng").write_text("mine")
     assert (tmp_path / "new.pcapng").read_text() == "mine"

@@ -60,7 +60,7 @@ class Drive(AwaitedFormerNames):
     ) -> None:
         self.bus = bus
         super().__init__(
-            Unit.at(bus, unit, profile, identification, unverified=unverified, trust_profile=trust_profile)
+            Unit.create(bus, unit, profile, identification, unverified=unverified, trust_profile=trust_profile)
         )
 
     # Names that are also rooms come after what is taken from the room.

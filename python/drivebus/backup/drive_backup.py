@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["backup", "diff", "restore"]
 
-Kept: TypeAlias = "Backup | str | os.PathLike[str]"
+BackupOrPath: TypeAlias = "Backup | str | os.PathLike[str]"
 """A backup, or the file of one."""
 
 
@@ -65,7 +65,7 @@ async def backup(
 
 async def restore(
     unit: Unit,
-    backup: Kept,
+    backup: BackupOrPath,
     dry_run: bool = False,
     *,
     groups: Sequence[str] | None = None,
@@ -118,7 +118,12 @@ async def restore(
 
 
 async def diff(
-    unit: Unit, backup: Kept | None = None, *, everything: bool = False, force: bool = False, unverified: bool = False
+    unit: Unit,
+    backup: BackupOrPath | None = None,
+    *,
+    everything: bool = False,
+    force: bool = False,
+    unverified: bool = False,
 ) -> Diff:
     """How the drive differs from *backup*. None: how it differs from the factory settings, as far as they are known.
 
@@ -177,7 +182,7 @@ async def diff(
     return found
 
 
-def _kept(unit: Unit, backup: Kept, force: bool = False) -> Backup:
+def _kept(unit: Unit, backup: BackupOrPath, force: bool = False) -> Backup:
     """*backup* in the words of this drive's family."""
     from drivebus.backup.model import Backup
 

@@ -16,10 +16,10 @@ from drivebus.capture import Captured, Writer
 from drivebus.capture.standing import LOOK, Standing
 from drivebus.cli.present.output import remark
 
-__all__ = ["Kept"]
+__all__ = ["CaptureFile"]
 
 
-class Kept:
+class CaptureFile:
     """A capture into *target*, for a `with` block. Opened at once, so that what cannot be written is told at once.
 
     Args:
@@ -67,7 +67,7 @@ class Kept:
             return
         (self._writer or self._begin()).write(frame)
 
-    def __enter__(self) -> Kept:
+    def __enter__(self) -> CaptureFile:
         return self
 
     def __exit__(

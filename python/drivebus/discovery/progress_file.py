@@ -15,7 +15,7 @@ from drivebus.backup.model import Origin
 from drivebus.backup.unread import WHY, Unread
 from drivebus.errors import BadArgument, WrongDrive
 
-__all__ = ["Group", "Kept"]
+__all__ = ["Group", "ProgressFile"]
 
 
 @dataclass(slots=True)
@@ -36,7 +36,7 @@ class Group:
 
 
 @dataclass(slots=True)
-class Kept:
+class ProgressFile:
     """A discovery that goes on.
 
     Attributes:
@@ -54,7 +54,7 @@ class Kept:
     requests: int = 0
 
     @classmethod
-    def begin(cls, path: Path | None, origin: Origin, *, resume: bool) -> Kept:
+    def begin(cls, path: Path | None, origin: Origin, *, resume: bool) -> ProgressFile:
         """What an earlier call left in *path*, if it was of the same drive; else a new one.
 
         Raises:
@@ -75,7 +75,7 @@ class Kept:
         return kept
 
     @classmethod
-    def of(cls, path: Path) -> Kept:
+    def of(cls, path: Path) -> ProgressFile:
         """What an earlier call left in *path*, of whatever drive.
 
         Raises:
@@ -126,7 +126,7 @@ class Kept:
         if self.path is not None:
             atomic_file.remove(self.path)
 
-    def _take(self, left: Kept) -> None:
+    def _take(self, left: ProgressFile) -> None:
         if left.whose != self.whose:
             other = ", ".join(
                 f"{name} {left.whose.get(name)}" for name in self.whose if left.whose.get(name) != self.whose[name]

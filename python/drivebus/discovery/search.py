@@ -11,7 +11,7 @@ from drivebus.backup.create import origin_of
 from drivebus.backup.unread import Unread, lost, refused
 from drivebus.discovery.found import Discovery
 from drivebus.discovery.group_scan import LAST, Walk
-from drivebus.discovery.progress_file import Group, Kept
+from drivebus.discovery.progress_file import Group, ProgressFile
 from drivebus.errors import BadAnswer, BadArgument, NoAnswer, Refused, WrongDrive
 from drivebus.operations import raw_words
 from drivebus.operations.unit import Unit
@@ -46,7 +46,7 @@ async def search(
         Discovery.check(unit.profile, place, base)
     part = None if place is None else atomic_file.part_of(place)
     await unit.identity.check(unit.bus)
-    kept = Kept.begin(part, await origin_of(unit), resume=resume)
+    kept = ProgressFile.begin(part, await origin_of(unit), resume=resume)
     asking = _Search(unit, kept)
     try:
         if not kept.groups:
@@ -78,7 +78,7 @@ def _is_unchanged(unit: Unit, place: Path, base: str | None) -> bool:
     """Whether *place* is what an earlier call made that did not settle all, and nobody edited it."""
     if not (place.name and place.is_dir() and atomic_file.is_there(atomic_file.part_of(place))):
         return False
-    kept = Kept.of(atomic_file.part_of(place))
+    kept = ProgressFile.of(atomic_file.part_of(place))
     if {*kept.groups} - {*unit.profile.parameter_groups()}:
         return False
     found = _result(unit, kept, [*kept.groups])
@@ -91,7 +91,7 @@ def _is_unchanged(unit: Unit, place: Path, base: str | None) -> bool:
 class _Search:
     """The reads of one discovery."""
 
-    def __init__(self, unit: Unit, kept: Kept) -> None:
+    def __init__(self, unit: Unit, kept: ProgressFile) -> None:
         self._unit = unit
         self._kept = kept
 
@@ -216,7 +216,7 @@ def _groups(unit: Unit, groups: Sequence[str] | None) -> list[int]:
     return sorted({known[group] for group in groups})
 
 
-def _result(unit: Unit, kept: Kept, wanted: Sequence[int]) -> Discovery:
+def _result(unit: Unit, kept: ProgressFile, wanted: Sequence[int]) -> Discovery:
     """What was found in the groups that were *wanted*, by the codes that the profile has for them."""
     profile = unit.profile
     rows = [profile.describe(name) for name in profile.names()]

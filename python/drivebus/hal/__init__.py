@@ -7,7 +7,19 @@ tells the drive, `loop` brings the three together, and `linuxcnc` is what is ask
 from drivebus.hal.core import Scale, Spindle
 from drivebus.hal.linuxcnc import Alive, HalGone, component, module
 from drivebus.hal.loop import Loop
-from drivebus.hal.motor import Motor
+from drivebus.hal.motor import SpindleMotor
 from drivebus.hal.pins import PINS, Container, Pins
 
-__all__ = ["PINS", "Alive", "Container", "HalGone", "Loop", "Motor", "Pins", "Scale", "Spindle", "component", "module"]
+__all__ = [
+    "PINS",
+    "Alive",
+    "Container",
+    "HalGone",
+    "Loop",
+    "Pins",
+    "Scale",
+    "Spindle",
+    "SpindleMotor",
+    "component",
+    "module",
+]

@@ -9,7 +9,7 @@ from drivebus.drive import Drive
 from drivebus.errors import DrivebusError, NotAllowed, Refused, Unconfirmed
 from drivebus.hal.core import Action, Run, Speed, Spindle
 from drivebus.hal.linuxcnc import HalGone
-from drivebus.hal.motor import Motor
+from drivebus.hal.motor import SpindleMotor
 from drivebus.hal.pins import Pins
 
 __all__ = ["Loop"]
@@ -40,7 +40,7 @@ class Loop:
         self,
         pins: Pins,
         spindle: Spindle,
-        motor: Motor,
+        motor: SpindleMotor,
         drive: Drive,
         say: Callable[[str], None],
         watch: Watch | None = None,

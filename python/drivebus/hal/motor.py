@@ -16,7 +16,7 @@ from drivebus.profile import Profile
 from drivebus.values import State
 from drivebus.watchdog import Watchdog
 
-__all__ = ["Motor"]
+__all__ = ["SpindleMotor"]
 
 _CURRENT = "output_current"
 
@@ -24,7 +24,7 @@ _ACTIONS = ("stop", "coast", "trip")
 """What the drive is to do by itself, the best first: a spindle that coasts turns for long."""
 
 
-class Motor:
+class SpindleMotor:
     """What one drive turns.
 
     Args:
@@ -126,7 +126,7 @@ class Motor:
         if self._watchdog is not None:
             self._watchdog.close()
 
-    def __enter__(self) -> Motor:
+    def __enter__(self) -> SpindleMotor:
         self._motor.__enter__()
         return self
 

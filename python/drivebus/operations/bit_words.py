@@ -85,7 +85,7 @@ async def special_control(
 
 
 async def _word(unit: Unit, name: str) -> int:
-    unit.evidence.reads([name])
+    unit.evidence.require_readable([name])
     [word] = await raw_words.read_words(unit, unit.profile.address(name))
     return word
 
@@ -104,7 +104,7 @@ async def _terminals(unit: Unit, name: str) -> dict[str, bool]:
 
 async def _set_bits(unit: Unit, setpoint: str, given: Mapping[str, object], force: bool) -> None:
     register = setpoints.register_of(unit, setpoint)
-    unit.evidence.writes(register)
+    unit.evidence.require_writable(register)
     known, masks = unit.profile.describe(register), _masks(unit, register)
     if not given:
         raise BadArgument(f"nothing to set was named; {register} has {', '.join(masks) or 'no bits that are known'}")

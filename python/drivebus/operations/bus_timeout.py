@@ -132,7 +132,7 @@ class BusTimeout:
 
     async def _put_back(self) -> None:
         with self._unit.bus.undisturbed() as bus:
-            await parameters.write(self._unit.over(bus), self._former)
+            await parameters.write(self._unit.with_bus(bus), self._former)
             self.armed = False
             self._will.withdraw()
 

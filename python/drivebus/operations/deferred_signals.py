@@ -12,14 +12,14 @@ from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any
 
-__all__ = ["Kept"]
+__all__ = ["DeferredSignals"]
 
 _Handler = Callable[[int, "FrameType | None"], Any]
 
 # The one that comes most often is the first to be held up, and the last to be let go.
 _SIGNALS = [signal.SIGINT, *sorted(signal.valid_signals() - {signal.SIGINT})]
 
-_open: list[Kept] = []
+_open: list[DeferredSignals] = []
 """Those in force, in the main thread; an event loop may stop several motors at once."""
 _formers: dict[int, _Handler] = {}
 """Whose handlers wait. One that is not put back yet works as it did."""
@@ -27,7 +27,7 @@ _came: dict[int, FrameType | None] = {}
 """What came meanwhile, once each."""
 
 
-class Kept:
+class DeferredSignals:
     """A block in which the program's own handlers of signals wait, until the stop has gone out.
 
     What came until then is handled when the block ends, and raises there what it raises; after that Ctrl-C cuts short
@@ -47,7 +47,7 @@ class Kept:
         """Whether the stop has."""
         return self._gone_out()
 
-    def __enter__(self) -> Kept:
+    def __enter__(self) -> DeferredSignals:
         if threading.current_thread() is not threading.main_thread():
             return self
         _open.append(self)

@@ -89,7 +89,7 @@ def views(bus: AwaitableBus) -> list[Unit]:
         profile = record.profile
         if profile is not None:
             trusted = profile.name in record.trusted or record.started_unverified
-            seen.append(Unit.at(bus, record.address, profile, None, unverified=trusted, trust_profile=False))
+            seen.append(Unit.create(bus, record.address, profile, None, unverified=trusted, trust_profile=False))
     return seen
 
 

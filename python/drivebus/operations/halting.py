@@ -209,7 +209,7 @@ class Halt:
     async def _send(self, target: Target) -> None:
         unit, command = target
         profile, record = unit.profile, unit.record
-        unit.evidence.commands(command)
+        unit.evidence.require_command(command)
         record.halts_begun += 1
         self._frames += 1
         self.sent = unit.bus.now()

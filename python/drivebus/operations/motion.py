@@ -196,7 +196,7 @@ async def reset_fault(unit: Unit, *, confirm: float = 1.0, unverified: bool = Fa
     """
     confirm = checks.number("confirm", confirm, 0.0, 3600.0)
     unit = unit.trusting(unverified)
-    unit.evidence.commands("reset_fault")
+    unit.evidence.require_command("reset_fault")
     unit = await unit.unless_halted()
     before = await state.glance(unit)
     untold = "state" in before.missing and "fault" in before.missing
@@ -243,7 +243,7 @@ async def _halt(unit: Unit, command: str, confirm: float, within: float, *, coas
     confirm = checks.number("confirm", confirm, 0.0, 3600.0)
     within = checks.number("within", within, 0.0, 3600.0)
     unit = halting(unit, command)
-    unit.evidence.commands(command)
+    unit.evidence.require_command(command)
     can_coast = coasts and unit.evidence.unusable("coast") is None
     halt = Halt(unit, (command, command, command, "coast") if can_coast else (command,), within)
     await halt.until_taken()

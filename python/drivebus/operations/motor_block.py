@@ -56,7 +56,7 @@ class MotorBlock:
         self._start = start
         self._end = end
         # Other threads and the end of the interpreter have no event loop: they end it over a line that blocks.
-        self._elsewhere = unit.over(unit.bus.blocking())
+        self._elsewhere = unit.with_bus(unit.bus.blocking())
         self._guard = Guard(self._end_at_once, unit.bus.line)
         self._will = LastWill(unit)
         self._started = False
@@ -143,7 +143,7 @@ class MotorBlock:
         if not self._guard.begin_to_end():
             return None, None
         try:
-            return await self._end_by_all_means(self._unit.over(bus))
+            return await self._end_by_all_means(self._unit.with_bus(bus))
         except GeneratorExit:
             self._leave()
             raise

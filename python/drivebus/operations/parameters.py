@@ -120,7 +120,7 @@ def _may_follow(unit: Unit, run: Sequence[Planned], item: Planned) -> bool:
     profile, last = unit.profile, run[-1]
     if item.address != last.address + 1 or len(run) == profile.max_words or not profile.requests().joined:
         return False
-    alone = unit.evidence.once(_alone)
+    alone = unit.evidence.cached(_alone)
     if not all(_is_plain(unit, each) and key(each.known) not in alone for each in (last, item)):
         return False
     together = {key(each.known) for each in (*run, item)}
@@ -185,7 +185,7 @@ def plan_write(unit: Unit, name: str, value: object, store: bool) -> Planned:
             ),
             unit=unit.address,
         )
-    unit.evidence.writes(name)
+    unit.evidence.require_writable(name)
     if known.kind == "parameter" and not store and unit.profile.memory() is None:
         raise BadArgument(
             Text(
@@ -197,7 +197,7 @@ def plan_write(unit: Unit, name: str, value: object, store: bool) -> Planned:
             unit=unit.address,
         )
     raw = unit.profile.encode(name, value)
-    unit.evidence.writes_word(name, raw)
+    unit.evidence.require_writable_word(name, raw)
     address = unit.profile.address(name, store=store)
     if known.kind == "parameter" and (address != known.place or not store):
         memory = unit.profile.memory()
@@ -255,7 +255,7 @@ def _limits(unit: Unit, known: Description) -> list[_Limit]:
     limits = [_Limit(other, low) for other, low in named if other is not None]
     if known.kind == "parameter":
         have = {unit.profile.describe(limit.other).code for limit in limits}
-        limits += [limit for limit in unit.evidence.once(_narrowing).get(key(known), ()) if limit.other not in have]
+        limits += [limit for limit in unit.evidence.cached(_narrowing).get(key(known), ()) if limit.other not in have]
     return limits
 
 

@@ -23,7 +23,7 @@ from types import FrameType
 
 from drivebus._native import begin_of_child, end_of_program
 from drivebus.errors import NotAllowed, NotReady
-from drivebus.operations.deferred_signals import Kept
+from drivebus.operations.deferred_signals import DeferredSignals
 
 __all__ = ["Guard", "before_start", "end_over"]
 
@@ -107,9 +107,9 @@ class Guard:
             raise _too_late()
         raise SystemExit
 
-    def keeping_interruptions(self, gone_out: Callable[[], bool]) -> Kept:
+    def keeping_interruptions(self, gone_out: Callable[[], bool]) -> DeferredSignals:
         """A block in which what a signal raises is kept until it *gone_out*, as this one's own signals are."""
-        return Kept(lambda: self._ended or gone_out(), _on_signal)
+        return DeferredSignals(lambda: self._ended or gone_out(), _on_signal)
 
     def begin_to_end(self) -> bool:
         """Whether its owner is to end it now: not where the end of the program did. A signal meanwhile waits."""
@@ -169,7 +169,7 @@ def before_start() -> None:
 
 def end_over(line: object) -> None:
     """Ends all that is ended over *line*, which is to be closed."""
-    with Kept(lambda: False, _on_signal):
+    with DeferredSignals(lambda: False, _on_signal):
         for guard in reversed(list(_guards.values())):
             if guard.needs(line):
                 guard.end_for_others("when the bus was closed")
@@ -227,7 +227,7 @@ def _end_all() -> None:
     """What is left when the interpreter ends: blocks in daemon threads, and generators that nobody closed."""
     _notice_fork()
     _over.append(True)
-    with Kept(lambda: False, _on_signal):
+    with DeferredSignals(lambda: False, _on_signal):
         for number, guard in reversed(list(_guards.items())):
             guard.end_for_others()
             _guards.pop(number, None)

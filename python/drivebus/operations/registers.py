@@ -53,7 +53,7 @@ async def read(unit: Unit, *names: str, verify: bool = False, unverified: bool =
 async def snapshot(unit: Unit, *names: str, verify: bool = False, unverified: bool = False) -> Snapshot:
     """Reads *names* in the fewest requests, under one time stamp. *verify* and *unverified* as for `read`."""
     unit = unit.trusting(unverified)
-    unit.evidence.reads(names)
+    unit.evidence.require_readable(names)
     unit = await unit_variants.settled(unit, *names)
     plan = unit.profile.compile(names)
     answers: list[list[int]] = []
@@ -85,8 +85,8 @@ def readable(unit: Unit, *names: str) -> list[str]:
     """See `Drive.readable`."""
     if not names:
         # The same each time, and looked up for every sample of a monitor.
-        return list(unit.evidence.once(_monitored))
-    unit.evidence.reads(names)
+        return list(unit.evidence.cached(_monitored))
+    unit.evidence.require_readable(names)
     for name in names:
         if unit_variants.is_open(unit, name):
             variant = unit.profile.describe(name).variant or ""
@@ -129,5 +129,5 @@ async def contradiction(unit: Unit) -> str | None:
 
 
 def _monitored(evidence: Evidence) -> Sequence[str]:
-    known, undecided = evidence.readable(evidence.profile.monitor_names()), evidence.once(unit_variants.undecided)
+    known, undecided = evidence.readable(evidence.profile.monitor_names()), evidence.cached(unit_variants.undecided)
     return [name for name in known if evidence.profile.describe(name).variant not in undecided]

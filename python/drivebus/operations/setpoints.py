@@ -172,8 +172,8 @@ def _as_checked(unit: Unit, name: str, checked: SetpointRange) -> Unit:
             f"unit {unit.address}, {unit.profile.title}; nothing was sent",
             unit=unit.address,
         )
-    unit.evidence.writes(register_of(unit, name))
-    return unit.under(checked.profile)
+    unit.evidence.require_writable(register_of(unit, name))
+    return unit.with_profile(checked.profile)
 
 
 async def with_setpoint(unit: Unit, setpoint: str) -> Unit:
@@ -223,7 +223,7 @@ async def word_of(unit: Unit, hz: float) -> int:
     """*hz* as the drive counts it, if that is no more than its own maximum."""
     hz = checks.number("setpoint", hz, 0.0)
     register = _frequency_in_hz(unit)
-    unit.evidence.writes(register)
+    unit.evidence.require_writable(register)
     raw = unit.profile.encode(register, hz)
     limit = unit.profile.describe(register).high_from
     if limit is not None and unit.evidence.unreadable(limit) is None:

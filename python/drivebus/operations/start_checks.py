@@ -27,7 +27,7 @@ _LOOKS_TO_PROVE = 10
 
 def may_be_given(unit: Unit, command: str) -> None:
     """Raises `NotAllowed` where *command* may not be given, or what it starts could not be stopped again."""
-    unit.evidence.commands(command)
+    unit.evidence.require_command(command)
     start_sequence.check_seen(unit)
     can_be_stopped(unit)
 

@@ -125,7 +125,7 @@ async def ping(unit: Unit) -> None:
 
 def planned(unit: Unit) -> _Plan:
     """What a look at the unit reads."""
-    return unit.evidence.once(_plan)
+    return unit.evidence.cached(_plan)
 
 
 def _plan(evidence: Evidence) -> _Plan:

@@ -52,7 +52,7 @@ class _Stop:
         if self._halt.is_taken:
             self._proof = await motion.prove(self._halt, self._confirm)
             return False
-        self._unit.evidence.commands(_STOP)
+        self._unit.evidence.require_command(_STOP)
         if not await self._halt.step() and self._halt.is_over:
             raise await self._halt.failure()
         return False

@@ -42,7 +42,7 @@ class Unit:
         object.__setattr__(self, "profile", self.evidence.profile)
 
     @classmethod
-    def at(
+    def create(
         cls,
         bus: AwaitableBus,
         address: int,
@@ -63,7 +63,7 @@ class Unit:
         """Whether what no document of its family proves is done all the same."""
         return self.evidence.unverified
 
-    def over(self, bus: AwaitableBus) -> Unit:
+    def with_bus(self, bus: AwaitableBus) -> Unit:
         """The same unit over another face of the same line."""
         return replace(self, bus=bus)
 
@@ -84,6 +84,6 @@ class Unit:
         identity = SameUnit(self.bus, self.record, profile)
         return replace(self, evidence=Evidence(profile, self.address, True), identity=identity)
 
-    def under(self, profile: Profile) -> Unit:
+    def with_profile(self, profile: Profile) -> Unit:
         """The same unit, whose words are known better: by *profile*."""
         return replace(self, evidence=self.evidence.of(profile))

@@ -16,29 +16,29 @@ __all__ = ["is_open", "rules", "settled", "undecided"]
 
 def rules(unit: Unit) -> Mapping[str, Variant]:
     """Each variant of the family, with the parameter that decides it and what that may say."""
-    return unit.evidence.once(_rules)
+    return unit.evidence.cached(_rules)
 
 
 def is_open(unit: Unit, name: str) -> bool:
     """Whether a parameter of the drive decides what *name* means, and nobody said how."""
-    return unit.profile.describe(name).variant in unit.evidence.once(undecided)
+    return unit.profile.describe(name).variant in unit.evidence.cached(undecided)
 
 
 def undecided(evidence: Evidence) -> Set[str]:
     """The variants of the family that nobody said how they are."""
-    return set(evidence.once(_rules)) - set(evidence.profile.variants_chosen)
+    return set(evidence.cached(_rules)) - set(evidence.profile.variants_chosen)
 
 
 async def settled(unit: Unit, *names: str) -> Unit:
     """The same unit, with everything fixed on which the meaning of *names* depends."""
-    still_open = unit.evidence.once(undecided)
+    still_open = unit.evidence.cached(undecided)
     if not still_open:
         return unit
     wanted = [known.variant for name in names if (known := unit.profile.describe(name)).variant]
     chosen = {variant: await _chosen(unit, variant) for variant in wanted if variant in still_open}
     if not chosen:
         return unit
-    return unit.under(unit.profile.with_variants({**unit.profile.variants_chosen, **chosen}))
+    return unit.with_profile(unit.profile.with_variants({**unit.profile.variants_chosen, **chosen}))
 
 
 def given(unit: Unit, variant: str) -> Text:
@@ -58,7 +58,7 @@ async def _chosen(unit: Unit, variant: str) -> str:
             Text(f"{rule.reason.rstrip('.')}; ", says),
             unit.address,
         )
-    unit.evidence.reads([parameter])
+    unit.evidence.require_readable([parameter])
     known = unit.profile.describe(parameter)
     raw = known.number(await read_words(unit, unit.profile.address(parameter), known.words))
     for choice, value in choices.items():

@@ -60,7 +60,7 @@ def _check_told(unit: Unit, what: str, *roles: str) -> None:
                 "is known",
                 unit=unit.address,
             )
-        unit.evidence.reads([name])
+        unit.evidence.require_readable([name])
 
 
 async def wait_until_stopped(unit: Unit, timeout: float = 60.0, *, unverified: bool = False) -> Status:

@@ -56,13 +56,13 @@ class Evidence:
 
     def trusting(self, unverified: bool) -> Evidence:
         """The rule under which, if *unverified*, what is not verified may be used as well."""
-        return self.once(_all_of_it) if unverified and not self.unverified else self
+        return self.cached(_all_of_it) if unverified and not self.unverified else self
 
     def of(self, profile: Profile) -> Evidence:
         """The same trust in another profile."""
         return Evidence(profile, self.unit, self.unverified)
 
-    def once(self, work: Callable[[Evidence], _T]) -> _T:
+    def cached(self, work: Callable[[Evidence], _T]) -> _T:
         """What *work* makes of this, worked out when it is asked for first."""
         try:
             result: _T = self._worked_out[work]
@@ -71,7 +71,7 @@ class Evidence:
             result = self._worked_out[work] = work(self)
         return result
 
-    def reads(self, names: Iterable[str]) -> None:
+    def require_readable(self, names: Iterable[str]) -> None:
         """Raises `NotAllowed` if one of *names* may not be read."""
         for name in names:
             if not isinstance(name, str):
@@ -107,7 +107,7 @@ class Evidence:
         """Those of *names* that may be read."""
         return [name for name in names if self.unreadable(name) is None]
 
-    def writes(self, name: str) -> None:
+    def require_writable(self, name: str) -> None:
         """Raises `NotAllowed` if *name* may not be written."""
         known = self.profile.describe(name)
         if known.address is None:
@@ -115,13 +115,13 @@ class Evidence:
         if known.evidence != "verified" and not self.unverified:
             raise not_verified(f"writing {self._named(name)}", known.reason, self.unit)
 
-    def writes_word(self, name: str, word: int) -> None:
+    def require_writable_word(self, name: str, word: int) -> None:
         """Raises `NotAllowed` if nothing that is printed tells whether *name* takes *word*."""
         known = self.profile.describe(name)
         if not (known.bounded or word in known.choices or self.unverified):
             raise not_verified(f"writing {word} to {self._named(name)}", _NO_RANGE, self.unit)
 
-    def commands(self, name: str) -> None:
+    def require_command(self, name: str) -> None:
         """Raises `NotAllowed` if the family has no command *name*, or it may not be given."""
         reason = self.unusable(name)
         if name not in self.profile.commands():

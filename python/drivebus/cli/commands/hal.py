@@ -10,7 +10,7 @@ import click
 from drivebus.cli.option_types import Place, Rpm, Seconds, Share
 from drivebus.cli.present.output import remark
 from drivebus.cli.session import Session, pass_session
-from drivebus.hal import Alive, HalGone, Loop, Motor, Pins, Scale, Spindle, component, module
+from drivebus.hal import Alive, HalGone, Loop, Pins, Scale, Spindle, SpindleMotor, component, module
 
 __all__ = ["COMMANDS"]
 
@@ -80,7 +80,7 @@ def hal(
 
     with session.bus(retries=_RETRIES) as bus:
         drive = session.drive_on(bus)
-        motor = Motor(drive, seconds, say)
+        motor = SpindleMotor(drive, seconds, say)
         known = component(linuxcnc, name)
         gone = False
         try:

@@ -13,7 +13,7 @@ from rich.live import Live
 
 import drivebus
 from drivebus.capture import Captured
-from drivebus.cli.capture_file import Kept
+from drivebus.cli.capture_file import CaptureFile
 from drivebus.cli.names import parse_families
 from drivebus.cli.option_types import Place, Seconds, Whole
 from drivebus.cli.present.error_wording import in_commands
@@ -85,7 +85,7 @@ def sniff(
     with ExitStack() as opened:
         kept = None
         if target is not None:
-            kept = opened.enter_context(Kept(target, force, port, settings, link))
+            kept = opened.enter_context(CaptureFile(target, force, port, settings, link))
         heard = drivebus.sniff(
             port,
             baudrate=session.baud,
@@ -152,7 +152,7 @@ def _function(text: str) -> int:
     return function
 
 
-def _keep(kept: Kept, exchange: Exchange, char_time: float) -> None:
+def _keep(kept: CaptureFile, exchange: Exchange, char_time: float) -> None:
     """Writes what was heard of *exchange*, each frame with the moment of its end."""
     if exchange.request is not None:
         kept.write(Captured(exchange.time + char_time * len(exchange.request), exchange.request, True))
@@ -163,7 +163,7 @@ def _keep(kept: Kept, exchange: Exchange, char_time: float) -> None:
         kept.write(Captured(exchange.answered or exchange.time + char_time * len(raw), raw, None))
 
 
-def _told(session: Session, figures: Figures, target: str | None, kept: Kept | None) -> None:
+def _told(session: Session, figures: Figures, target: str | None, kept: CaptureFile | None) -> None:
     """Says what was heard, and what it means."""
     asked = sum(unit.requests for unit in figures.units.values())
     answered = sum(unit.answers for unit in figures.units.values())

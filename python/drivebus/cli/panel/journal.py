@@ -14,7 +14,7 @@ import drivebus
 from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.output import printable
 
-__all__ = ["LOGGER", "Journal", "Line"]
+__all__ = ["LOGGER", "Journal", "JournalLine"]
 
 LOGGER = "drivebus.panel"
 """The logger that has a record of level INFO for each line."""
@@ -22,7 +22,7 @@ LOGGER = "drivebus.panel"
 _KEPT = 500
 
 
-class Line(NamedTuple):
+class JournalLine(NamedTuple):
     """One line: when, what, and in which style."""
 
     when: datetime
@@ -38,7 +38,7 @@ class Journal:
     """
 
     def __init__(self) -> None:
-        self._lines: deque[Line] = deque(maxlen=_KEPT)
+        self._lines: deque[JournalLine] = deque(maxlen=_KEPT)
         self._logger = logging.getLogger(LOGGER)
         self.count = 0
 
@@ -46,7 +46,7 @@ class Journal:
         """Tells *text*."""
         shown = printable(text)
         self._logger.info("%s", shown)
-        self._lines.append(Line(datetime.now(), shown, style))
+        self._lines.append(JournalLine(datetime.now(), shown, style))
         self.count += 1
 
     def fail(self, what: str, error: drivebus.DrivebusError) -> None:
@@ -58,6 +58,6 @@ class Journal:
         """Has the logger alone keep where *error*, which nobody foresaw, came from."""
         self._logger.debug("it ends by a mistake of its own", exc_info=error)
 
-    def lines(self) -> list[Line]:
+    def lines(self) -> list[JournalLine]:
         """All that are kept."""
         return list(self._lines)

@@ -17,13 +17,13 @@ from typing import Any
 import drivebus
 from drivebus.cli import watch_list
 from drivebus.cli.panel.journal import Journal
-from drivebus.cli.panel.motors import Motor
+from drivebus.cli.panel.motors import PanelMotor
 from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.motors import on_the_way
 from drivebus.cli.present.screen import Watched
 from drivebus.cli.session import Session
 
-__all__ = ["Line", "Member", "opened"]
+__all__ = ["Member", "WatchedLine", "opened"]
 
 KEPT = 240
 """Values of each trend that are kept: a minute, at four a second."""
@@ -55,10 +55,10 @@ class Member:
         told: What its status words say beside the state, in the drive's own words.
     """
 
-    def __init__(self, session: Session, line: Line, journal: Journal, watchdog: float | None) -> None:
+    def __init__(self, session: Session, line: WatchedLine, journal: Journal, watchdog: float | None) -> None:
         self.session = session
         self.line = line
-        self.motor = Motor(session.called, self._halt, self._tell, journal, watchdog)
+        self.motor = PanelMotor(session.called, self._halt, self._tell, journal, watchdog)
         self.drive: drivebus.Drive | None = None
         self.watched: Watched | None = None
         self.highest: float | None = None
@@ -215,7 +215,7 @@ class Member:
             self.session.halt(self.line.bus, "stop", lambda drive: drive.stop(**options))
 
 
-class Line:
+class WatchedLine:
     """One bus, and the drives on it that are shown.
 
     Attributes:
@@ -313,7 +313,7 @@ def opened(session: Session, journal: Journal, watchdog: float | None) -> Iterat
     Raises:
         PortError: A port is not there, busy or not permitted.
     """
-    lines: dict[str, Line] = {}
+    lines: dict[str, WatchedLine] = {}
     members = []
     with ExitStack() as stack:
         for named in session.several or (session,):
@@ -321,7 +321,7 @@ def opened(session: Session, journal: Journal, watchdog: float | None) -> Iterat
             one = replace(named, beside_unit_0=False)
             key = one.line_key
             if key not in lines:
-                lines[key] = Line(stack.enter_context(one.bus()), one.one_port())
+                lines[key] = WatchedLine(stack.enter_context(one.bus()), one.one_port())
             member = Member(one, lines[key], journal, watchdog)
             lines[key].members.append(member)
             members.append(member)

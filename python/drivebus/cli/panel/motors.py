@@ -15,7 +15,7 @@ from queue import SimpleQueue
 import drivebus
 from drivebus.cli.panel.journal import Journal
 
-__all__ = ["Motor", "stop_all", "wait_for_all"]
+__all__ = ["PanelMotor", "stop_all", "wait_for_all"]
 
 _PAUSE = 0.05
 """Seconds between two stops while a start is under way: on a line full of stops, which go first, no start ends."""
@@ -44,7 +44,7 @@ class _Block:
         self.orders.put(None)
 
 
-class Motor:
+class PanelMotor:
     """The motor of one drive.
 
     Args:
@@ -271,14 +271,14 @@ class Motor:
             self._under_way -= 1
 
 
-def stop_all(motors: Iterable[Motor]) -> None:
+def stop_all(motors: Iterable[PanelMotor]) -> None:
     """Stops those of *motors* that this panel started, all at once."""
     for motor in motors:
         if motor.started:
             motor.stop()
 
 
-def wait_for_all(motors: Iterable[Motor]) -> None:
+def wait_for_all(motors: Iterable[PanelMotor]) -> None:
     """Waits until all that this panel started are stopped, or could not be."""
     for motor in motors:
         motor.wait()

@@ -12,7 +12,7 @@ import drivebus
 from drivebus.cli.option_types import Place, Seconds, Whole
 from drivebus.cli.present.errors import exit_code
 from drivebus.cli.present.output import remark
-from drivebus.cli.raw.families import Families
+from drivebus.cli.raw.families import UnitFamilies
 from drivebus.cli.raw.request import request_of
 from drivebus.cli.raw.script import Send, Step, Typed, requests_of, typed_in
 from drivebus.cli.raw.sending import Sender
@@ -111,7 +111,7 @@ def _lines(script: str | None) -> list[str]:
         raise click.UsageError(f"{script} cannot be read: {error.strerror or error}") from None
 
 
-def _steps(session: Session, typed: Sequence[Typed], families: Families) -> list[Step]:
+def _steps(session: Session, typed: Sequence[Typed], families: UnitFamilies) -> list[Step]:
     """What all lines ask for."""
     found = (requests_of(line, families.find, session.unverified) for line in typed)
     return [step for step in found if step is not None]
@@ -120,7 +120,7 @@ def _steps(session: Session, typed: Sequence[Typed], families: Families) -> list
 def _send(
     session: Session,
     bus: drivebus.Bus,
-    steps_of: Callable[[Families], list[Step]],
+    steps_of: Callable[[UnitFamilies], list[Step]],
     count: int,
     interval: float | None,
     keep_going: bool,
@@ -128,7 +128,7 @@ def _send(
     yes: bool,
 ) -> None:
     """Sends all of it, and ends with the exit code of what failed first."""
-    families = Families(session, bus)
+    families = UnitFamilies(session, bus)
     sender = Sender(session, bus, families, force, yes)
     steps = steps_of(families)
     sender.prepare(steps, count)

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 import drivebus
-from drivebus.cli.raw.families import Families
+from drivebus.cli.raw.families import UnitFamilies
 from drivebus.cli.raw.script import VERBS
 from drivebus.site import state_file
 
@@ -28,7 +28,7 @@ class Editing:
         unit: Whose names are meant, for the completion.
     """
 
-    def __init__(self, families: Families) -> None:
+    def __init__(self, families: UnitFamilies) -> None:
         self.unit = 1
         self._families = families
         self._readline = _readline()

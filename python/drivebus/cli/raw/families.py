@@ -9,10 +9,10 @@ from drivebus.cli.raw.request import Request, check_commands
 from drivebus.cli.session import Session
 from drivebus.line.write_guard import check_words
 
-__all__ = ["Families"]
+__all__ = ["UnitFamilies"]
 
 
-class Families:
+class UnitFamilies:
     """The families of the units on the line that *session* names.
 
     Args:

@@ -8,7 +8,7 @@ import drivebus
 from drivebus.cli.present.errors import tell
 from drivebus.cli.present.output import remark
 from drivebus.cli.raw.editing import Editing
-from drivebus.cli.raw.families import Families
+from drivebus.cli.raw.families import UnitFamilies
 from drivebus.cli.raw.script import Send, requests_of, typed_in
 from drivebus.cli.raw.sending import Sender
 from drivebus.cli.session import Declined, Session
@@ -30,7 +30,7 @@ quit, Ctrl-D            ends"""
 
 def prompt(session: Session, bus: drivebus.Bus, force: bool, yes: bool) -> None:
     """Asks for lines and sends what they say, until the last one."""
-    families = Families(session, bus)
+    families = UnitFamilies(session, bus)
     sender = Sender(session, bus, families, force, yes)
     unit = session.unit
     if not session.out.as_json:
@@ -52,7 +52,7 @@ def prompt(session: Session, bus: drivebus.Bus, force: bool, yes: bool) -> None:
     sender.remind()
 
 
-def _done(line: str, unit: int, sender: Sender, families: Families, session: Session, force: bool) -> int:
+def _done(line: str, unit: int, sender: Sender, families: UnitFamilies, session: Session, force: bool) -> int:
     """Does what *line* says, and returns the unit whose names are meant from then on. No error ends the prompt."""
     total = 0
     try:

@@ -9,7 +9,7 @@ import drivebus
 from drivebus.cli.present.errors import tell
 from drivebus.cli.present.frames import show_frame
 from drivebus.cli.present.output import remark
-from drivebus.cli.raw.families import Families
+from drivebus.cli.raw.families import UnitFamilies
 from drivebus.cli.raw.request import Request
 from drivebus.cli.raw.script import Send, Step, Wait, located
 from drivebus.cli.session import Session, ask_once
@@ -35,7 +35,7 @@ class Sender:
         moved: Whether a command was sent that can move a motor.
     """
 
-    def __init__(self, session: Session, bus: drivebus.Bus, families: Families, force: bool, yes: bool) -> None:
+    def __init__(self, session: Session, bus: drivebus.Bus, families: UnitFamilies, force: bool, yes: bool) -> None:
         self._session = session
         self._bus = bus
         self._families = families
