@@ -1,6 +1,6 @@
 """What a unit is, as far as it tells: by its identification code, or by which words it answers and which it refuses.
 
-Only reads are sent here. Whether what was found is enough to command a motor by it is decided in `choose`.
+Only reads are sent here. Whether what was found is enough to command a motor by it is decided in `profile_choice`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A scan of a line: which units are asked, how long each is given, and what is told of one that answers.
 
-It asks with the settings that the line has. Other speeds and formats are tried by `searching`.
+It asks with the settings that the line has. Other speeds and formats are tried by `line_search`.
 
 A drive of Huanyang that speaks the maker's own protocol hears each request of Modbus, too, and nobody documents how it
 ends a frame. Its command is `03 01` and a code, so a read of holding registers 0100H to 01FFH begins as one, and its

@@ -1,7 +1,7 @@
 """Listening to others on a line, without a word: who asks whom for what, and what comes of it.
 
 `frames` says what stands in a frame, `families` which family a unit may be, `pairing` makes exchanges of what the core
-has told apart, `figures` counts them and says what they mean for the line, and `listening` hears a port.
+has told apart, `statistics` counts them and says what they mean for the line, and `live` hears a port.
 """
 
 from drivebus.sniffer.exchange import Exchange

@@ -4,8 +4,9 @@
         trial = drivebus.trial.step(bus.drive(1), 10, 30, duration=10, max_current=8)
         print(trial.figures.rise_time, trial.figures.overshoot)
 
-`courses` says what the setpoint does, `watching` what ends a trial early, `recording` moves the motor and records,
-`samples` is what came of that, `figures` is the arithmetic over it, and `trials` are the functions that one calls.
+`setpoint_courses` says what the setpoint does, `abort_rules` what ends a trial early, `recording` moves the motor and
+records, `samples` is what came of that, `metrics` is the arithmetic over it, and `trials` are the functions that one
+calls.
 """
 
 from drivebus.trial.metrics import RampFigures, SineFigures, StepFigures, peak, ramp_figures, sine_figures, step_figures

@@ -1,7 +1,7 @@
 """`drivebus sim`: serves simulated drives, and takes orders from another window while it does.
 
-`serve` is the command, `orders` what a simulation that runs is told, `meeting` the socket between the two windows, and
-`ctl` the other window.
+`serve` is the command, `control_commands` what a simulation that runs is told, `control_socket` the socket between the
+two windows, and `ctl` the other window.
 """
 
 from __future__ import annotations
