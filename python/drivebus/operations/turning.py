@@ -12,7 +12,7 @@ from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
 from drivebus.operations.unit import Unit
 
-__all__ = ["Turning"]
+__all__ = ["MotorFace", "Turning", "turning_of"]
 
 
 class Turning:
@@ -31,8 +31,10 @@ class Turning:
         self._confirm = 1.0
         self._entered = False
 
-    def __str__(self) -> str:
-        return f"unit {self._unit.address}: {'may turn' if self.may_turn else 'not started here'}"
+    @property
+    def address(self) -> int:
+        """The address of what turns."""
+        return self._unit.address
 
     @property
     def may_turn(self) -> bool:
@@ -52,14 +54,13 @@ class Turning:
                 f"the motor of unit {self._unit.address} is run inside its block, whose end stops it; nothing was sent",
                 unit=self._unit.address,
             )
-        if self._block is not None:
-            await motion.run(self._unit, hz, reverse=reverse, confirm=confirm, force=force)
-            return
 
         async def start() -> None:
             await motion.run(self._unit, hz, reverse=reverse, confirm=confirm, force=force)
 
-        self._confirm = 1.0
+        if self._block is not None:
+            await start()
+            return
         self._block = MotorBlock(self._unit, start, self._end, within=self._within)
         try:
             await self._block.begin()
@@ -77,13 +78,16 @@ class Turning:
             self.unstopped = None
         else:
             self._confirm = confirm
-            await block.finish()
+            try:
+                await block.finish()
+            finally:
+                self._confirm = 1.0
 
     async def leave(self, reason: BaseException | None) -> None:
         """Stops what was started here, and proves it: also what was told to stop before and did not take it."""
         block, self._block = self._block, None
         unstopped, self.unstopped = self.unstopped, None
-        self._entered, self._confirm = False, 1.0
+        self._entered = False
         if block is not None:
             await (block.finish() if reason is None else block.fail(reason))
         elif unstopped is not None:
@@ -96,3 +100,31 @@ class Turning:
             self.unstopped = error
             raise
         self.unstopped = None
+
+
+class MotorFace:
+    """What a motor tells of itself, in both faces, without asking the drive."""
+
+    def __init__(self, unit: Unit, within: float) -> None:
+        self._turning = Turning(unit, within)
+
+    def __repr__(self) -> str:
+        return f"<Motor of unit {self._turning.address}: {'may turn' if self.may_turn else 'not started here'}>"
+
+    @property
+    def may_turn(self) -> bool:
+        """Whether it was started here, and no stop was taken since."""
+        return self._turning.may_turn
+
+    @property
+    def unstopped(self) -> DrivebusError | None:
+        """Why the drive did not take or prove the last stop from here, after which it was told to coast; None else.
+
+        The end of the block sends another stop then.
+        """
+        return self._turning.unstopped
+
+
+def turning_of(motor: MotorFace) -> Turning:
+    """What a motor's methods carry out."""
+    return motor._turning
