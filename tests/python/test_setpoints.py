@@ -314,7 +314,9 @@ class TestCheckedBefore:
     def test_a_write_is_one_request_and_goes_to_the_nearest_count(
         self, virtual: Simulator, virtual_drive: Drive
     ) -> None:
+        before = virtual.line.requests
         allowed = virtual_drive.check_setpoints(10.0, 30.0)
+        assert virtual.line.requests - before == 1
         virtual.drive(1).take_writes()
         before = virtual.line.requests
         for hz in (10.0, 12.3449, 12.346, 30.0):

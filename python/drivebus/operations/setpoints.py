@@ -110,8 +110,8 @@ async def check_setpoints(unit: Unit, low: float, high: float, *, unverified: bo
         raise BadArgument(
             f"setpoints from {low:g} to {high:g} Hz are none; give the lower one first", unit=unit.address
         )
-    for hz in (low, high):
-        await word_of(unit, hz)
+    _counted(unit, low)
+    await word_of(unit, high)
     return SetpointRange(unit.address, low, high, unit.profile)
 
 
@@ -221,10 +221,8 @@ async def write_word(unit: Unit, word: int) -> None:
 
 async def word_of(unit: Unit, hz: float) -> int:
     """*hz* as the drive counts it, if that is no more than its own maximum."""
-    hz = checks.number("setpoint", hz, 0.0)
-    register = _frequency_in_hz(unit)
-    unit.evidence.require_writable(register)
-    raw = unit.profile.encode(register, hz)
+    raw = _counted(unit, hz)
+    register = register_of(unit, "frequency")
     limit = unit.profile.describe(register).high_from
     if limit is not None and unit.evidence.unreadable(limit) is None:
         highest: Value = await registers.read(unit, limit)
@@ -235,3 +233,11 @@ async def word_of(unit: Unit, hz: float) -> int:
                 unit=unit.address,
             )
     return raw
+
+
+def _counted(unit: Unit, hz: float) -> int:
+    """*hz* as the drive counts it, as far as the profile tells whether it may be sent."""
+    hz = checks.number("setpoint", hz, 0.0)
+    register = _frequency_in_hz(unit)
+    unit.evidence.require_writable(register)
+    return unit.profile.encode(register, hz)
