@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from drivebus import checks
 from drivebus.identify.same_unit import SameUnit
@@ -26,7 +26,6 @@ class Unit:
         identity: Whether it is what its profile says, and still the one it was.
         halts: How often it had been told to halt when this view was made for a start: where it was told to since, this
             view writes nothing any more.
-        profile: What its words mean: that of its evidence.
     """
 
     bus: AwaitableBus
@@ -35,11 +34,6 @@ class Unit:
     record: UnitRecord
     identity: SameUnit
     halts: int | None = None
-    profile: Profile = field(init=False, compare=False)
-
-    def __post_init__(self) -> None:
-        # Kept here, and not asked of the evidence each time: nothing of a unit is asked more often.
-        object.__setattr__(self, "profile", self.evidence.profile)
 
     @classmethod
     def create(
@@ -57,6 +51,11 @@ class Unit:
         record = units_of(getattr(bus, "line", bus)).record(address)
         identity = SameUnit(bus, record, profile, identification, trusted=checks.flag("trust_profile", trust_profile))
         return cls(bus, address, Evidence(profile, address, checks.flag("unverified", unverified)), record, identity)
+
+    @property
+    def profile(self) -> Profile:
+        """What its words mean."""
+        return self.evidence.profile
 
     @property
     def unverified(self) -> bool:
