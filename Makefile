@@ -195,10 +195,10 @@ MATRIX := test_halts_of_other_families test_halts_awaited test_unconfirmed_write
           test_panel_refused test_ends_beside_others test_ends_refused
 
 matrix: $(VENV)/.dev $(VENV)/.wheel ## some minutes; see tests/python/matrix.py
-	DRIVEBUS_MATRIX=all $(BIN)/python -m pytest -q -n $(TEST_JOBS) -p no:benchmark $(MATRIX:%=tests/python/%.py)
+	DRIVEBUS_MATRIX=all $(PYTEST) -q -n $(TEST_JOBS) $(MATRIX:%=tests/python/%.py)
 
 screens: $(VENV)/.dev $(VENV)/.wheel ## the screen of every command, in every window, as text in target/screens
-	DRIVEBUS_SCREENS=all $(BIN)/python -m pytest -q tests/python/test_cli_screens.py
+	DRIVEBUS_SCREENS=all $(PYTEST) -q tests/python/test_cli_screens.py
 
 conformance: $(PEERS)/.installed ## writes docs/conformance.md
 	$(PEERS)/bin/python -m tests.conformance.run $(if $(ONLY),--only $(ONLY),--out docs/conformance.md)
