@@ -15,7 +15,7 @@ from rich.status import Status
 import drivebus
 from drivebus.cli.option_types import Seconds, Whole
 from drivebus.cli.present.error_wording import in_commands
-from drivebus.cli.present.errors import EXIT_CODES
+from drivebus.cli.present.errors import exit_code
 from drivebus.cli.present.output import Output, counted, show
 from drivebus.cli.session import Session, parse_format, pass_session
 
@@ -129,7 +129,7 @@ def _exit_code(finding: drivebus.doctor.Finding) -> int:
     """What the process ends with if *finding* is the worst: that of the error which calls end with because of it."""
     if not finding.wrong or finding.error is None:
         return 0
-    return next((code for kind, code in EXIT_CODES if issubclass(finding.error, kind)), 1)
+    return exit_code(finding.error)
 
 
 COMMANDS = [doctor]

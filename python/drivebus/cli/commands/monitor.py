@@ -17,8 +17,9 @@ import drivebus
 from drivebus.cli import names, watch_list
 from drivebus.cli.open_lines import opened_lines
 from drivebus.cli.option_types import Seconds, Whole
-from drivebus.cli.present.csv_rows import moment, titled
+from drivebus.cli.present.csv_rows import titled
 from drivebus.cli.present.errors import exit_code
+from drivebus.cli.present.moments import moment
 from drivebus.cli.present.output import Output, printable, remark
 from drivebus.cli.present.screen import Screen, Watched
 from drivebus.cli.session import Session, pass_session

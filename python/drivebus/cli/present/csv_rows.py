@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
-from datetime import datetime, timezone
 from typing import TextIO
 
 import drivebus
+from drivebus.cli.present.moments import moment
 from drivebus.cli.present.output import printable
 
-__all__ = ["CsvRows", "moment", "titled"]
+__all__ = ["CsvRows", "titled"]
 
 
 class CsvRows:
@@ -36,11 +36,6 @@ class CsvRows:
         """One sample, at a Unix time in seconds."""
         self._csv.writerow([moment(time), *(printable(row.text(values[name])) for name, row in self._rows.items()), ""])
         self._file.flush()
-
-
-def moment(time: float) -> str:
-    """A Unix time in seconds as ISO 8601 in UTC."""
-    return datetime.fromtimestamp(time, timezone.utc).isoformat(timespec="microseconds")
 
 
 def titled(row: drivebus.Description, doubt: str) -> str:

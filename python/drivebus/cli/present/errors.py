@@ -7,9 +7,9 @@ from drivebus.advice import Text
 from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.output import remark
 
-__all__ = ["EXIT_CODES", "exit_code", "tell", "tell_wills"]
+__all__ = ["exit_code", "tell", "tell_wills"]
 
-EXIT_CODES: list[tuple[type[drivebus.DrivebusError], int]] = [
+_EXIT_CODES: list[tuple[type[drivebus.DrivebusError], int]] = [
     (drivebus.NotAllowed, 2),
     (drivebus.NoAnswer, 3),
     (drivebus.Refused, 4),
@@ -20,9 +20,10 @@ EXIT_CODES: list[tuple[type[drivebus.DrivebusError], int]] = [
 """What the process ends with, by whose fault it is; 0 is done, 1 anything else, such as differences found."""
 
 
-def exit_code(error: drivebus.DrivebusError) -> int:
-    """What the process ends with after *error*."""
-    return next((code for kind, code in EXIT_CODES if isinstance(error, kind)), 1)
+def exit_code(error: drivebus.DrivebusError | type[drivebus.DrivebusError]) -> int:
+    """What the process ends with after *error*, or after one of that kind."""
+    given = error if isinstance(error, type) else type(error)
+    return next((code for kind, code in _EXIT_CODES if issubclass(given, kind)), 1)
 
 
 def tell_wills(bus: drivebus.Bus) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import datetime, timezone
 from typing import Any
 
 import drivebus
 from drivebus import tables
 from drivebus.cli.present.errors import exit_code
+from drivebus.cli.present.moments import moment, time_of_day
 from drivebus.cli.present.output import Output, remark
 from drivebus.line import huanyang
 from drivebus.line.trace import meaning
@@ -68,8 +68,7 @@ class Lines:
             return
         when = ""
         if self._has_times:
-            moment = datetime.fromtimestamp(exchange.time).astimezone()
-            when = f"{moment.isoformat(sep=' ', timespec='microseconds')[11:26]} "
+            when = f"{time_of_day(exchange.time)} "
         gap = "" if exchange.gap is None or not self._has_times else f"+{exchange.gap * 1e3:.2f} ms"
         head = f"{when}{gap:>12}  "
         error = exchange.error
@@ -101,7 +100,7 @@ class Lines:
     def _record(self, exchange: Exchange) -> dict[str, Any]:
         error = exchange.error
         told: dict[str, Any] = {
-            "time": datetime.fromtimestamp(exchange.time, timezone.utc).isoformat(timespec="microseconds"),
+            "time": moment(exchange.time),
             "unit": exchange.unit,
             "profile": exchange.profile,
             "guessed": exchange.unit is not None and exchange.profile is not None and self._guessed(exchange.unit),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import logging
 from contextlib import suppress
-from datetime import datetime
 
 import click
 
 import drivebus
+from drivebus.cli.present.moments import time_of_day
 from drivebus.cli.present.output import Output, remark
 from drivebus.line.trace import LOGGER as TRACE_LOGGER
 from drivebus.line.trace import meaning
@@ -21,10 +21,9 @@ class _Shown(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Shows the frame of *record*."""
-        time = datetime.fromtimestamp(record.created).astimezone().isoformat(sep=" ", timespec="microseconds")
         # Whoever has gone and reads it no more must not keep a stop from being sent.
         with suppress(OSError):
-            remark(f"{time[11:26]} {record.getMessage()}")
+            remark(f"{time_of_day(record.created)} {record.getMessage()}")
 
 
 def show_frames(context: click.Context) -> None:
