@@ -23,6 +23,7 @@ from types import FrameType
 
 from drivebus._native import begin_of_child, end_of_program
 from drivebus.errors import NotAllowed, NotReady
+from drivebus.latch import Latch
 from drivebus.operations.deferred_signals import DeferredSignals
 
 __all__ = ["Guard", "before_start", "end_over"]
@@ -61,7 +62,7 @@ class Guard:
         self.deferred: SystemExit | None = None
         self.ended_by_others = False
         self._ended = False
-        self._ended_for_others = threading.Event()
+        self._ended_for_others = Latch()
         self._on_its_way = False
         self._begun = threading.Event()
 

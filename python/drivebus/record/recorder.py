@@ -16,6 +16,7 @@ from drivebus import _native, checks
 from drivebus.bus import Bus
 from drivebus.drive import Drive, check_drive
 from drivebus.errors import BadArgument, DrivebusWarning, NotAllowed
+from drivebus.latch import Latch
 from drivebus.line.poll_samples import Names, Sample
 from drivebus.operations.drive_base import DriveFace
 from drivebus.poll import Poll, never_run
@@ -107,7 +108,7 @@ class Recorder:
         self._witnesses = {drive: Witness(known, table) for drive, known in recorded.items()}
         self.gaps = 0
         self._never_run = ""
-        self._over = threading.Event()
+        self._over = Latch()
         self._lock = threading.Lock()
         by_bus: dict[Bus, dict[Drive, list[str]]] = {}
         for drive, known in recorded.items():

@@ -14,6 +14,7 @@ from drivebus import checks
 from drivebus._native import SerialFormat, frame_len
 from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed
+from drivebus.latch import Latch
 from drivebus.rtu import is_frame
 from drivebus.sniffer.exchange import Exchange
 from drivebus.sniffer.register_history import Seen
@@ -71,7 +72,7 @@ class Replay:
         self._told = told
         self._line = line
         self.unknown: set[bytes] = set()
-        self._over = threading.Event()
+        self._over = Latch()
         self._wake, self._woken = os.pipe()
         if transport == "tcp" or (transport == "auto" and not hasattr(os, "openpty")):
             self._open_tcp()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shlex
 import signal
-import threading
 from contextlib import ExitStack
 from typing import Any
 
@@ -20,6 +19,7 @@ from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, pass_ses
 from drivebus.cli.sim.control_commands import Orders, in_words
 from drivebus.cli.sim.control_socket import open_to_orders
 from drivebus.cli.sim.rates import rates_of
+from drivebus.latch import Latch
 
 __all__ = ["sim"]
 
@@ -134,7 +134,7 @@ def sim(
                 _take_orders(open_things, orders)
                 # Whoever reads the port may end it at once.
                 _say_what_is_served(session, simulator, opened(), heard_at)
-                threading.Event().wait()
+                Latch().wait()
         except KeyboardInterrupt:
             session.out.say("")
 
