@@ -329,6 +329,15 @@ def python_findings(root: Path) -> Iterator[str]:
                     yield f"{path.relative_to(root)}:{line}: {inside[0]} must not import {file[0]}"
 
 
+def command_findings(root: Path) -> Iterator[str]:
+    """A command makes a result; for whom it is shown, `cli/present` knows."""
+    cli = root / "python/drivebus/cli"
+    for path in (*sorted(cli.glob("commands/*.py")), *sorted(cli.glob("sim/*.py"))):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Attribute) and node.attr == "as_json":
+                yield f"{path.relative_to(root)}:{node.lineno}: present decides what --json shows, not a command"
+
+
 def own_names(nodes: tuple[ast.AST, ...]) -> set[str]:
     """The names with an underscore that a file defines: functions, classes, variables, attributes and slots."""
     names: set[str] = set()
@@ -412,7 +421,13 @@ def habit_findings(root: Path) -> Iterator[str]:
 
 def findings(root: Path) -> list[str]:
     """Everything that is wrong."""
-    return [*crate_findings(root), *room_findings(root), *python_findings(root), *habit_findings(root)]
+    return [
+        *crate_findings(root),
+        *room_findings(root),
+        *python_findings(root),
+        *command_findings(root),
+        *habit_findings(root),
+    ]
 
 
 # For manifests.
@@ -488,6 +503,12 @@ BREAKS: list[tuple[str, str | None, str, str]] = [
         None,
         "\nfrom drivebus.cli.session import Session\n",
         "present must not import session",
+    ),
+    (
+        "python/drivebus/cli/commands/monitor.py",
+        None,
+        "\n\ndef _is_for_a_program(session: Session) -> bool:\n    return session.out.as_json\n",
+        "present decides what --json shows, not a command",
     ),
 ]
 

@@ -161,10 +161,8 @@ class _Job:
 
     def title(self, text: str) -> None:
         self.step += 1
-        if self.out.as_json:
-            self.out.record({"step": self.step, "title": text})
-        else:
-            self.out.heading(f"{self.step}. {text}")
+        self.out.record({"step": self.step, "title": text})
+        self.out.heading(f"{self.step}. {text}")
 
     def expect(self, holds: bool, what: str, *, quietly: bool = False) -> None:
         if not holds:

@@ -9,10 +9,10 @@ import click
 from click.shell_completion import CompletionItem
 
 import drivebus
-from drivebus.backup.unread import Unread, counts, in_words
+from drivebus.backup.unread import in_words
 from drivebus.cli.names import complete_group
 from drivebus.cli.option_types import Place
-from drivebus.cli.present.error_wording import in_commands
+from drivebus.cli.present.backups import BackupTaken, Differences, RestoreReport
 from drivebus.cli.present.output import counted, remark
 from drivebus.cli.present.progress import progress_bar
 from drivebus.cli.session import Session, pass_session, yes_option
@@ -42,42 +42,11 @@ def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
     with session.drive() as drive, progress_bar(session.out, "reading") as progress:
         kept = drive.backup(file, not fresh, progress, force=force)
     place = file if kept.complete else file.with_name(f"{file.name}.part")
-    if session.out.as_json:
-        _show_as_json(session, place, kept)
-    else:
-        _show_backup(session, place, kept)
+    session.out.render(BackupTaken(kept, place, session.called))
     if not kept.complete:
         lost = [why for why in kept.unread.values() if why.open]
         remark(f"The backup is not complete: {in_words(lost)}, see above. The same command asks for the rest.")
         raise click.exceptions.Exit(1)
-
-
-def _show_as_json(session: Session, place: Path, kept: drivebus.Backup) -> None:
-    origin = {name: value for name, value in vars(kept.origin).items() if name != "taken"}
-    session.out.record(
-        {
-            "file": str(place),
-            **origin,
-            "taken": f"{kept.origin.taken:%Y-%m-%dT%H:%M:%SZ}",
-            "parameters": len(kept),
-            "complete": kept.complete,
-            "counts": counts(kept.unread.values()),
-            "unread": kept.unread,
-        }
-    )
-
-
-def _show_backup(session: Session, place: Path, kept: drivebus.Backup) -> None:
-    begun = f"{kept.origin.taken:%Y-%m-%d %H:%M} UTC"
-    profile = kept.profile
-    known = sum(profile.describe(name).kind == "parameter" for name in profile.names())
-    session.out.say(
-        f"{place}: {len(kept)} of the {known} parameters that the profile {profile.name} knows, of {session.called}, "
-        f"{kept.origin.title}, begun {begun}."
-    )
-    if kept.unread:
-        session.out.say(f"Not read: {in_words(kept.unread.values())}.")
-        session.out.rows(["code", "reason", "why"], [[code, why, why.why] for code, why in kept.unread.items()])
 
 
 def _keep_older(file: Path) -> None:
@@ -154,14 +123,14 @@ def restore(
         plan = drive.restore(kept, dry_run=True, **options)
         planned = plan.having("planned")
         if dry_run or not planned:
-            _show_report(session, kept.profile, plan, "Nothing to write." if not planned else "Nothing was written.")
+            end = "Nothing was written." if planned else "Nothing to write."
         else:
-            if not session.out.as_json:
-                _show_report(session, kept.profile, plan, "")
+            session.out.preview(RestoreReport(plan, kept.profile, ""))
             session.ask(_question(drive, [item.code for item in planned]), yes)
             with progress_bar(session.out, "writing") as progress:
                 plan = drive.restore(kept, progress=progress, **options)
-            _show_report(session, kept.profile, plan, f"{len(plan.having('restored'))} of {len(planned)} restored.")
+            end = f"{len(plan.having('restored'))} of {len(planned)} restored."
+        session.out.render(RestoreReport(plan, kept.profile, end))
     if not plan.ok:
         failed = sum(item.failed for item in plan)
         were = "would not be" if dry_run else "was not" if failed == 1 else "were not"
@@ -195,34 +164,8 @@ def diff(session: Session, a: str, b: str | None, everything: bool, force: bool)
     """
     found, profile = _diff(session, a, b, everything, force)
     unsettled = found.unsettled()
-    if session.out.as_json:
-        for each in found:
-            session.out.record(vars(each))
-        for code, why in unsettled.items():
-            session.out.record({"code": code, "not_compared": why.why, "reason": why})
-    else:
-        sides = (found.left if a == _FACTORY else a, found.right if b is None else b)
-        told = in_words(why for why in found.uncompared.values() if isinstance(why, Unread))
-        kinds = f" ({told})" if told else ""
-        rest = f" {len(found.uncompared)} were not compared{kinds}." if found.uncompared else ""
-        hint = " --all lists them." if rest and not everything else ""
-        session.out.say(f"{' -> '.join(sides)}: {len(found)} of {found.compared} parameters differ.{rest}{hint}")
-        if len(found):
-            rows = [
-                [
-                    each.code,
-                    *_texts(profile, each.code, each.left, each.right),
-                    each.unit,
-                    each.label,
-                    in_commands(each.reason),
-                ]
-                for each in found
-            ]
-            session.out.rows(["code", "was", "is", "unit", "label", "reason"], rows)
-        listed = found.uncompared if everything else unsettled
-        if listed:
-            session.out.say("Not compared:")
-            session.out.rows(["code", "reason"], listed.items())
+    sides = (found.left if a == _FACTORY else a, found.right if b is None else b)
+    session.out.render(Differences(found, profile, sides, everything))
     if unsettled:
         remark(f"{counted(len(unsettled), 'parameter')} could not be compared: {in_words(unsettled.values())}.")
     if found:
@@ -273,47 +216,6 @@ def _question(drive: drivebus.Drive, codes: list[str]) -> str:
     except drivebus.NotAllowed:
         text += ". Whether the motor turns cannot be asked of this family: look"
     return text
-
-
-def _show_report(session: Session, profile: drivebus.Profile, report: drivebus.Restoration, end: str) -> None:
-    """Every parameter as JSON; for people, those of which there is something to say."""
-    if session.out.as_json:
-        for item in report:
-            session.out.record(vars(item))
-        return
-    told = [item for item in report if _is_told(item)]
-    if told:
-        rows = [
-            [
-                item.code,
-                *_texts(profile, item.code, item.before, item.wanted),
-                item.unit,
-                item.result,
-                item.label,
-                in_commands(item.reason),
-            ]
-            for item in told
-        ]
-        session.out.rows(["code", "drive", "backup", "unit", "result", "label", "reason"], rows)
-    counts = {result: len(report.having(result)) for result in ("same", "skipped")}
-    session.out.say(
-        f"{end} The same: {counts['same']}. Left alone: {counts['skipped']} (fault history, read-only, and what has to "
-        "be asked for: serial settings, motor data).".strip()
-    )
-
-
-def _texts(profile: drivebus.Profile, code: str, *values: Any) -> list[str]:
-    """*values* of *code* with as many digits as the drive counts; empty for None."""
-    known = profile.describe(code)
-    return ["" if value is None else known.text(value) for value in values]
-
-
-def _is_told(item: drivebus.Restored) -> bool:
-    """Whether there is something to say of *item*: what failed always, what was left alone where it differs."""
-    if item.failed:
-        return True
-    differs = item.result != "same" and item.before != item.wanted
-    return differs and (item.result != "skipped" or item.before is not None)
 
 
 COMMANDS = [backup, restore, diff]

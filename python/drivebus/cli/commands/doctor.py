@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import shlex
 from contextlib import closing, nullcontext
 from time import monotonic
-from typing import Any
 
 import click
 from click.core import ParameterSource
@@ -14,15 +11,11 @@ from rich.status import Status
 
 import drivebus
 from drivebus.cli.option_types import Seconds, Whole
-from drivebus.cli.present.error_wording import in_commands
-from drivebus.cli.present.errors import exit_code
-from drivebus.cli.present.output import Output, counted, show
+from drivebus.cli.present.findings import Finding
+from drivebus.cli.present.output import counted, show
 from drivebus.cli.session import Session, parse_format, pass_session
 
 __all__ = ["COMMANDS"]
-
-_SIGNS = {"ok": "ok", "note": "note", "warning": "WARNING", "fault": "FAULT"}
-_STYLES = {"ok": "green", "note": "", "warning": "bold yellow", "fault": "bold red"}
 
 
 @click.command()
@@ -67,7 +60,7 @@ def doctor(
         unit = session.unit
     bits, parity, stop = line_format or session.line_format
     out = session.out
-    wrong: list[drivebus.doctor.Finding] = []
+    wrong: list[Finding] = []
     began = monotonic()
     with Status("", console=out.console) if out.live else nullcontext() as status:
         findings = drivebus.doctor.examine(
@@ -87,49 +80,19 @@ def doctor(
         )
         # Closing it closes the port, also where Ctrl-C or a full pipe ends this.
         with closing(findings):
-            for finding in findings:
-                _show(out, finding, port)
-                if finding.wrong:
+            for found in findings:
+                finding = Finding(found, port)
+                out.render(finding)
+                if found.wrong:
                     wrong.append(finding)
     took = f"Took {monotonic() - began:.0f} s."
     if not wrong:
         out.say(f"Nothing is wrong. {took}")
         return
-    counts = [(name, sum(finding.severity == name for finding in wrong)) for name in ("fault", "warning")]
-    found = ", ".join(counted(count, name) for name, count in counts if count)
-    out.say(f"{found}. {took}")
+    counts = [(name, sum(finding.found.severity == name for finding in wrong)) for name in ("fault", "warning")]
+    out.say(f"{', '.join(counted(count, name) for name, count in counts if count)}. {took}")
     # The first of the worst.
-    context.exit(_exit_code(max(wrong, key=lambda finding: finding.severity.rank)))
-
-
-def _show(out: Output, finding: drivebus.doctor.Finding, port: str) -> None:
-    # What it says to type is for this port, unless the environment has it.
-    here = "`drivebus " if os.environ.get("DRIVEBUS_PORT") == port else f"`drivebus --port {shlex.quote(port)} "
-    text, advice = (in_commands(said).replace("`drivebus ", here) for said in (finding.text, finding.advice))
-    if out.as_json:
-        fields: dict[str, Any] = {
-            "step": finding.step,
-            "name": finding.name,
-            "severity": finding.severity,
-            "unit": finding.unit,
-            "text": text,
-            "advice": advice,
-            "values": finding.values,
-            "exit_code": _exit_code(finding),
-        }
-        out.record(fields)
-        return
-    style = _STYLES[finding.severity.value]
-    out.say(f"{_SIGNS[finding.severity.value]:<8} {text}", style, hanging=9)
-    if advice:
-        out.say(f"{'':<8} -> {advice}", hanging=3)
-
-
-def _exit_code(finding: drivebus.doctor.Finding) -> int:
-    """What the process ends with if *finding* is the worst: that of the error which calls end with because of it."""
-    if not finding.wrong or finding.error is None:
-        return 0
-    return exit_code(finding.error)
+    context.exit(max(wrong, key=lambda finding: finding.found.severity.rank).exit_code)
 
 
 COMMANDS = [doctor]

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import click
 
 import drivebus
-from drivebus import tables
 from drivebus.cli import names
 from drivebus.cli.parallel import each_drive
+from drivebus.cli.present.descriptions import Description, Group, Groups, Matches
 from drivebus.cli.present.error_wording import in_commands
-from drivebus.cli.present.output import counted
+from drivebus.cli.present.fault_lists import FaultHistory, FaultsByFamily, KnownFaults
 from drivebus.cli.session import Session, pass_session
 
 __all__ = ["COMMANDS"]
-
-_MATCHES = 20
-"""Most rows that a search shows: who has more of them asks for something narrower."""
 
 
 @click.command()
@@ -44,41 +38,9 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
         found = profile.search(wanted, limit=10_000)
         if not found:
             raise
-        _show_matches(session, profile, wanted, found)
+        session.out.render(Matches(profile, wanted, [profile.describe(name) for name in found]))
         return
-    values = dict(vars(known))
-    values["address"] = None if known.place is None else tables.shown(known.place)
-    if not session.out.as_json:
-        values["choices"] = ", ".join(f"{number} = {label}" for number, label in known.choices.items())
-        values["bits"] = ", ".join(known.bits or {})
-        values["unverified_bits"] = ", ".join(known.unverified_bits)
-        del values["verified"]  # `evidence` says more
-        if known.writable and known.verified and not known.bounded:
-            printed = " but for its choices" if known.choices else ""
-            values["write"] = f"unverified{printed}: its range is not printed"
-    session.out.facts(values)
-
-
-def _show_matches(session: Session, profile: drivebus.Profile, wanted: str, found: list[str]) -> None:
-    has_them = all(word in _all_of(profile.describe(found[0])) for word in wanted.lower().split())
-    matches = "match" if len(found) == 1 else "matches"
-    count = f"{len(found)} {matches}" if has_them else f"nothing that is called so, and {len(found)} near {matches}"
-    narrower = f", the best {_MATCHES} of them; more words narrow it" if len(found) > _MATCHES else ""
-    session.out.say(f'{profile.name} has {count} for "{wanted}"{narrower}:')
-    session.out.rows(_NAMED, [_match(profile, name) for name in found[:_MATCHES]])
-
-
-def _all_of(row: drivebus.Description) -> str:
-    """What is known of *row*, to look for a word in."""
-    return str(vars(row)).lower()
-
-
-_NAMED = ["name", "code", "address", "unit", "label", "evidence"]
-
-
-def _match(profile: drivebus.Profile, name: str) -> list[Any]:
-    known = profile.describe(name)
-    return [known.name, known.code, _address(known), known.unit, known.label, known.evidence]
+    session.out.render(Description(known))
 
 
 @click.command(name="list")
@@ -93,7 +55,7 @@ def list_(session: Session, group: str | None) -> None:
     profile = session.known_profile()
     rows = [profile.describe(name) for name in profile.names()]
     if group is None:
-        _show_groups(session, profile, rows)
+        session.out.render(_all_groups(profile, rows))
         return
     wanted = group.lower()
     chosen = {
@@ -108,16 +70,7 @@ def list_(session: Session, group: str | None) -> None:
     if not chosen and not unlisted and wanted not in _ALWAYS:
         known = ", ".join([*_ALWAYS, *_groups(rows)])
         raise drivebus.BadArgument(f'{profile.name} has no group "{group}"; it has {known}')
-    session.out.say(f"{profile.title}, {group}: {counted(len(chosen), 'row')}")
-    session.out.rows(
-        ["name", "code", "address", "unit", "range", "access", "label"],
-        [
-            [row.name, row.code, _address(row), row.unit, _range(row), row.access, row.label]
-            for row in sorted(chosen, key=lambda row: (row.kind == "parameter", row.address is None, row.address))
-        ],
-    )
-    if unlisted and not session.out.as_json:
-        session.out.say(unlisted)
+    session.out.render(Group(f"{profile.title}, {group}", chosen, unlisted))
 
 
 def _unlisted(profile: drivebus.Profile, group: str) -> str:
@@ -136,33 +89,19 @@ _ALWAYS = ("registers", "monitor", "parameters", "all")
 """Groups that every family has."""
 
 
-def _show_groups(session: Session, profile: drivebus.Profile, rows: list[drivebus.Description]) -> None:
+def _all_groups(profile: drivebus.Profile, rows: list[drivebus.Description]) -> Groups:
     registers = [row for row in rows if row.kind == "register"]
-    listed = [["registers", len(registers), "registers that only the bus has"]]
-    listed.append(["monitor", len(profile.monitor_names()), "what `drivebus monitor` shows by default"])
+    listed = [("registers", len(registers), "registers that only the bus has")]
+    listed.append(("monitor", len(profile.monitor_names()), "what `drivebus monitor` shows by default"))
     for name in _groups(rows):
         members = [row for row in rows if row.group == name]
-        listed.append(
-            [name, len(members), ", ".join(row.label for row in members[:3]) + (", …" if members[3:] else "")]
-        )
-    session.out.say(f"{profile.title}: {counted(len(rows), 'name')}; `drivebus list GROUP` shows those of a group")
-    session.out.rows(["group", "names", "such as"], listed)
+        such_as = ", ".join(row.label for row in members[:3]) + (", …" if members[3:] else "")
+        listed.append((name, len(members), such_as))
+    return Groups(profile.title, len(rows), listed)
 
 
 def _groups(rows: list[drivebus.Description]) -> list[str]:
     return list(dict.fromkeys(row.group for row in rows if row.group))
-
-
-def _address(row: drivebus.Description) -> str | None:
-    return None if row.place is None else tables.shown(row.place)
-
-
-def _range(row: drivebus.Description) -> str:
-    if row.choices:
-        return f"{len(row.choices)} choices"
-    if row.low is None or row.high is None:
-        return ""
-    return f"{row.text(row.low)} to {row.text(row.high)}"
 
 
 @click.command()
@@ -180,50 +119,15 @@ def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
     if everything or text:
         _show_known(session, " ".join(text))
         return
-    out = session.out
     with session.drive() as drive:
-        history = drive.fault_history()
-        kept = bool(drive.profile.fault_history)
+        past = drive.fault_history()
         try:
-            present, reason = drive.fault(), None
+            present, unknown = drive.fault(), None
         except drivebus.NotAllowed as error:
-            present, reason = None, in_commands(error)
-    if out.as_json:
-        if reason is not None:
-            out.record({"when": "now", "missing": reason})
-        listed = [("now", present)] if present is not None else []
-        if present is None and reason is None:
-            out.record({"when": "now", "code": None, "label": "no fault"})
-        for when, fault in [*listed, *_numbered(history)]:
-            out.record({"when": when, **dict(zip(_COLUMNS, _row(fault), strict=True)), "values": dict(fault.values)})
-        return
-    if reason is not None:
-        out.say(f"The present fault is not known: {reason}")
-    else:
-        out.say("No fault now." if present is None else f"Now: {present}")
-    if present is not None:
-        out.facts({"cause": present.cause, "remedy": present.remedy, "note": present.note})
-    if not kept:
-        out.say("Where this family keeps its last faults is not known.")
-    elif not history:
-        out.say("The history is empty, or may not be read.")
-    else:
-        out.say("History, the latest first:")
-        out.rows(["when", *_COLUMNS], [[when, *_row(fault)] for when, fault in _numbered(history)])
-        if history[0].values:
-            out.say("What the drive saw at the last one:")
-            out.rows(["parameter", "value", "unit", "label"], _values(drive, history[0].values))
-
-
-_COLUMNS = ["code", "mnemonic", "label", "cause", "remedy", "verified"]
-
-
-def _row(fault: drivebus.Fault) -> list[Any]:
-    return [fault.code, fault.mnemonic, fault.label, fault.cause, fault.remedy, fault.verified]
-
-
-def _numbered(history: list[drivebus.Fault]) -> list[tuple[str, drivebus.Fault]]:
-    return [("last" if number == 0 else f"{number} before", fault) for number, fault in enumerate(history)]
+            present, unknown = None, in_commands(error)
+    kept = past[0].values if past else ()
+    described = {name: drive.describe(name) for name in kept}
+    session.out.render(FaultHistory(present, unknown, past, bool(drive.profile.fault_history), described))
 
 
 def _show_known(session: Session, text: str) -> None:
@@ -237,14 +141,7 @@ def _show_known(session: Session, text: str) -> None:
         raise drivebus.BadArgument(
             f'{profile.name} names no fault "{text}"; `drivebus faults --all` lists those it names'
         )
-    if text and len(known) == 1 and not session.out.as_json:
-        [fault] = known
-        session.out.say(str(fault))
-        session.out.facts({"cause": fault.cause, "remedy": fault.remedy, "note": fault.note})
-        return
-    if not known and not session.out.as_json:
-        session.out.say("No fault of this family is known by number; the drive's manual has them.")
-    session.out.rows(_COLUMNS, [_row(fault) for fault in known])
+    session.out.render(KnownFaults(known, bool(text)))
 
 
 def _show_of_all(session: Session, text: str) -> None:
@@ -254,18 +151,7 @@ def _show_of_all(session: Session, text: str) -> None:
     ]
     if not found:
         raise drivebus.BadArgument(f'no family that is known names a fault "{text}"; `drivebus profiles` lists them')
-    # Families of one maker have most of their faults in common.
-    families: dict[tuple[Any, ...], list[str]] = {}
-    for name, fault in found:
-        families.setdefault(tuple(_row(fault)[:-1]), []).append(name)
-    if session.out.as_json:
-        for row, names_of in families.items():
-            session.out.record({"families": names_of, **dict(zip(_COLUMNS, row, strict=False))})
-        return
-    for row, names_of in families.items():
-        code, mnemonic, label, cause, remedy = row
-        session.out.say(f"{code} {mnemonic}: {label} ({', '.join(names_of)})".replace(" :", ":"), "bold")
-        session.out.facts({"cause": cause, "remedy": remedy})
+    session.out.render(FaultsByFamily(found))
 
 
 def _meant(known: list[drivebus.Fault], text: str) -> list[drivebus.Fault]:
@@ -284,11 +170,6 @@ def _meant(known: list[drivebus.Fault], text: str) -> list[drivebus.Fault]:
         if found or text.isdecimal():
             return found
     return []
-
-
-def _values(drive: drivebus.Drive, values: Mapping[str, Any]) -> list[list[Any]]:
-    known = [(value, drive.describe(name)) for name, value in values.items()]
-    return [[row.code or row.name, value, row.unit, row.label] for value, row in known]
 
 
 COMMANDS = [faults, describe, list_]

@@ -13,10 +13,11 @@ from drivebus.cli import names
 from drivebus.cli.commands import scan_search
 from drivebus.cli.option_types import Seconds
 from drivebus.cli.parallel import each_drive
-from drivebus.cli.present import profile_rules
+from drivebus.cli.present.drive_facts import DriveStatus, Identity, KnownDrive, Reading, Readings
 from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.errors import exit_code, tell
-from drivebus.cli.present.output import Output, counted, remark
+from drivebus.cli.present.found_units import FoundUnit
+from drivebus.cli.present.output import counted, remark
 from drivebus.cli.session import Session, pass_session
 from drivebus.line.scan_order import PROTOCOLS, asked
 
@@ -91,7 +92,7 @@ def scan(
             for found in bus.scan([unit], timeout, protocol="huanyang" if foreign else "modbus"):
                 answered.append(found)
                 session.keep_found(found)
-                _show_found(session, found)
+                session.out.render(FoundUnit(found))
             progress.advance(task)
         took = bus.now() - began
     if answered:
@@ -106,112 +107,35 @@ def scan(
         raise click.exceptions.Exit(3)
 
 
-def _show_found(session: Session, found: drivebus.Found) -> None:
-    if session.out.as_json:
-        code = None if found.identification is None else f"{found.identification:#06x}"
-        session.out.record({**vars(found), "identification": code})
-        return
-    if found.protocol != "modbus" and found.problem is not None:
-        said = found.problem.removeprefix("it ")
-        session.out.say(f"unit {found.unit}: {said}, {found.round_trip * 1000:.1f} ms")
-        return
-    family = found.profile or " or ".join(found.candidates) or "unknown family"
-    if found.certainty == "shared" and found.profile is not None:
-        others = (name for name in found.candidates if name != found.profile)
-        family += f" (or {' or '.join(others)})"
-    code = "" if found.identification is None else f", identification {found.identification:#06x}"
-    sure = "" if found.certainty in ("certain", "unknown") else f", {found.certainty}"
-    problem = f" ({found.problem})" if found.problem else ""
-    session.out.say(f"unit {found.unit}: {family}{code}{sure}, {found.round_trip * 1000:.1f} ms{problem}")
-
-
 @click.command()
 @each_drive
 def info(session: Session) -> None:
     """Show which drive it is and how sure that is, what is known about its family, and whether it obeys the bus."""
-    out = session.out
     with session.bus() as bus:
         found = bus.identify(session.unit)
-        facts: dict[str, Any] = {
-            "unit": found.unit,
-            "identification": None if found.code is None else f"{found.code:#06x}",
-            "certainty": found.certainty,
-            "reason": found.reason,
-            "may_be": found.candidates if out.as_json else " or ".join(found.candidates),
-            "port": bus.port,
-            "line": f"{session.baud} {''.join(session.line_format)}",
-        }
+        identity = Identity(found, bus.port, f"{session.baud} {''.join(session.line_format)}")
         try:
             drive = session.drive_on(bus)
         except drivebus.NotAllowed:
-            out.facts(facts)
+            session.out.render(identity)
             raise
         control = drive.check_control()
-        profile = drive.profile
         contradiction = drive.contradiction()
         against = None if contradiction is None else in_commands(contradiction)
-        out.facts(
-            {
-                "unit": drive.unit,
-                "profile": profile.name,
-                "family": profile.family,
-                "title": profile.title,
-                "kind": profile.kind,
-                **facts,
-                "contradiction": against,
-                "memory": "; ".join(profile_rules.memory(profile)),
-                **_round_trip(bus, drive.unit, out.as_json),
-                "status": _facts_of(drive.status()) if out.as_json else str(drive.status()),
-                "obeys_bus": bool(control) if len(control) else None,
-            }
-        )
-        if against is not None:
-            remark(f"{against[0].upper()}{against[1:]}. Until then nothing is written to it.")
-        elif found.candidates and profile.family not in found.candidates:
-            remark(f"It is treated as {profile.family}, and does not say that it is one.")
-        if not len(control):
-            out.say("What makes it obey the bus is not known.")
-            return
-        if out.as_json:
-            out.rows(
-                ["code", "is", "needed", "ok", "verified", "label", "note"],
-                [
-                    [item.code, item.actual, item.wanted, item.ok, item.verified, item.label, item.note]
-                    for item in control
-                ],
-            )
-            return
-        out.rows(
-            ["code", "is", "needed", "ok", "label"],
-            [[item.code, item.actual, item.wanted, item.ok, item.label] for item in control],
-        )
-        for item in control:
-            if item.note:
-                out.say(f"{item.code}{'' if item.verified else ' is not verified'}: {item.note}")
+        known = KnownDrive(identity, drive.profile, against, _round_trip(bus, drive.unit), drive.status(), control)
+    session.out.render(known)
+    if against is not None:
+        remark(f"{against[0].upper()}{against[1:]}. Until then nothing is written to it.")
+    elif found.candidates and known.profile.family not in found.candidates:
+        remark(f"It is treated as {known.profile.family}, and does not say that it is one.")
 
 
-def _round_trip(bus: drivebus.Bus, unit: int, as_json: bool) -> dict[str, Any]:
-    """How long an echo takes there and back: seconds in JSON, as everywhere. Nothing if the unit takes no echo."""
+def _round_trip(bus: drivebus.Bus, unit: int) -> float | None:
+    """Seconds that an echo takes there and back; None if the unit takes no echo."""
     try:
-        seconds = bus.echo(unit)
+        return bus.echo(unit)
     except drivebus.Refused:
-        return {"round_trip": None}
-    return {"round_trip": round(seconds, 6) if as_json else f"{seconds * 1e3:.1f} ms"}
-
-
-def _facts_of(status: drivebus.Status) -> dict[str, Any]:
-    """What *status* tells, by name, and what it does not, and why."""
-    return {
-        "state": status.state,
-        "ready": status.ready,
-        "frequency": status.frequency,
-        "setpoint": status.setpoint,
-        "commands_from": status.source,
-        "motor": status.motor,
-        "overload_alarm": status.overload_alarm,
-        "fault": status.fault,
-        "missing": dict(status.missing),
-    }
+        return None
 
 
 @click.command()
@@ -221,29 +145,13 @@ def status(session: Session) -> None:
 
     Missing values are named, with the reason.
     """
-    out = session.out
     with session.drive() as drive:
         now = drive.status()
         measured = _measured(drive)
-    values = _facts_of(now)
-    if out.as_json:
-        out.record({**values, **measured})
-        return
-    del values["missing"]
-    if "state" in now.missing:
-        values["state"] = None
-    for name in ("frequency", "setpoint"):
-        if values[name] is not None:
-            values[name] = f"{values[name]:.2f} Hz"
-    shown = {
-        name: f"{drive.describe(name).text(value)} {drive.describe(name).unit}" for name, value in measured.items()
-    }
-    out.facts({**values, **shown})
-    if now.missing:
-        out.say("Missing:")
-        out.facts(now.missing)
-        if "state" in now.missing and drive.profile.state_reason() is not None and not drive.unverified:
-            out.say("`--unverified` also shows what no document of this family proves.")
+    unproved = "state" in now.missing and drive.profile.state_reason() is not None and not drive.unverified
+    hint = "`--unverified` also shows what no document of this family proves." if unproved else ""
+    described = {name: drive.describe(name) for name in measured}
+    session.out.render(DriveStatus(now, measured, described, hint))
 
 
 _MEASURED = ("output_current", "output_voltage", "bus_voltage", "rotation_speed")
@@ -273,25 +181,19 @@ def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
     Values that could be read are shown even if others fail. Failures are reported on standard error and set the exit
     code.
     """
-    rows: list[dict[str, Any]] = []
-    failed: list[tuple[str, drivebus.DrivebusError]] = []
+    rows: list[Reading] = []
     with session.drive() as drive:
         places = [names.resolve(drive.profile, text) for text in wanted]
         # Nothing is asked where one of them is wrong; what a parameter of the drive decides has to be asked.
         drive.readable(*(name for name in places if isinstance(name, str) and drive.describe(name).variant is None))
         for place in places:
-            row = _described(drive, place)
+            rows.append(_described(drive, place))
             try:
-                row["value"] = value = _value(drive, place, row, verify)
-                row["text"] = str(value) if isinstance(place, int) else drive.describe(place).text(value)
-                bits = drive.profile.fields(place, int(value)) if isinstance(place, str) else {}
-                if bits:
-                    row["bits"] = bits
+                _read(drive, place, rows[-1], verify)
             except drivebus.DrivebusError as error:
-                failed.append((row["name"], error))
-                row |= {"error": in_commands(error), "exit_code": exit_code(error)}
-            rows.append(row)
-    _show_read(session.out, rows)
+                rows[-1].error = error
+    session.out.render(Readings(rows))
+    failed = [(row.name, row.error) for row in rows if row.error is not None]
     for name, reason in failed:
         tell(reason, name)
     session.advise(*(reason for _, reason in failed))
@@ -299,44 +201,24 @@ def read(session: Session, wanted: tuple[str, ...], verify: bool) -> None:
         raise click.exceptions.Exit(exit_code(failed[0][1]))
 
 
-def _described(drive: drivebus.Drive, place: str | int) -> dict[str, Any]:
+def _described(drive: drivebus.Drive, place: str | int) -> Reading:
     """What is known of a name, or of an address without one, before it is asked."""
     if isinstance(place, int):
-        return {"name": f"{place:04X}H", "value": None, "unit": "", "label": "unknown register", "evidence": None}
+        return Reading(f"{place:04X}H", "", "unknown register", None)
     known = drive.describe(place)
-    return {
-        "name": known.code or known.name,
-        "value": None,
-        "unit": known.unit,
-        "label": known.label,
-        "evidence": names.evidence(drive.profile, known),
-    }
+    return Reading(known.code or known.name, known.unit, known.label, names.evidence(drive.profile, known))
 
 
-def _value(drive: drivebus.Drive, place: str | int, row: dict[str, Any], verify: bool) -> Any:
-    if isinstance(place, str):
-        return drive.read(place, verify=verify)
-    [word] = drive.read_words(place, verify=verify)
-    row["label"] += f", raw {word:#06x}"
-    return word
-
-
-def _show_read(out: Output, rows: list[dict[str, Any]]) -> None:
-    """Every row as JSON; for people, those that came."""
-    if out.as_json:
-        for row in rows:
-            row.pop("text", None)
-            out.record(row)
+def _read(drive: drivebus.Drive, place: str | int, row: Reading, verify: bool) -> None:
+    """Asks for what *row* is to have."""
+    if isinstance(place, int):
+        [word] = drive.read_words(place, verify=verify)
+        row.label += f", raw {word:#06x}"
+        row.value, row.text = word, str(word)
         return
-    came = [row for row in rows if "error" not in row]
-    columns = ["name", "value", "unit", "label", "evidence"]
-    if all(row["evidence"] in ("verified", None) for row in came):
-        columns.remove("evidence")
-    if came:
-        out.rows(columns, [[row["text" if column == "value" else column] for column in columns] for row in came])
-    for row in came:
-        if "bits" in row:
-            out.say(f"{row['name']}: {', '.join(f'{name} = {meaning}' for name, meaning in row['bits'].items())}")
+    row.value = value = drive.read(place, verify=verify)
+    row.text = drive.describe(place).text(value)
+    row.bits = drive.profile.fields(place, int(value))
 
 
 COMMANDS = [ports, scan, info, status, read]

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import csv
-import sys
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from queue import SimpleQueue
 from threading import Thread
 from typing import Any
 
 import click
-from rich.live import Live
 
 import drivebus
 from drivebus.cli import names, watch_list
 from drivebus.cli.open_lines import opened_lines
 from drivebus.cli.option_types import Seconds, Whole
-from drivebus.cli.present.csv_rows import titled
 from drivebus.cli.present.errors import exit_code
-from drivebus.cli.present.moments import moment
-from drivebus.cli.present.output import Output, printable, remark
-from drivebus.cli.present.screen import Screen, Watched
+from drivebus.cli.present.output import remark
+from drivebus.cli.present.samples import view_for
+from drivebus.cli.present.screen import Watched
 from drivebus.cli.session import Session, pass_session
 
 __all__ = ["COMMANDS"]
@@ -48,7 +44,6 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
     object for each sample. A missing sample is shown as missing, and the next one is asked for. If none
     comes at all, the exit code says why.
     """
-    out = session.out
     interrupted = False
     with ExitStack() as open_lines:
         lines: list[tuple[drivebus.Bus, _Drives]] = [
@@ -56,7 +51,8 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
             for bus, drives in opened_lines(session, open_lines)
         ]
         drives = [drive for _, line in lines for drive in line]
-        seen = _Seen(out, [watched for watched, _ in drives])
+        view = view_for(session.out, [watched for watched, _ in drives])
+        seen = _Seen()
         polls = [
             open_lines.enter_context(
                 bus.poll({drive: watch_list.asked(watched) for watched, drive in line}, interval or None, size=_KEPT)
@@ -65,15 +61,18 @@ def monitor(session: Session, wanted: tuple[str, ...], interval: float, count: i
         ]
         by_drive = {id(drive): watched for watched, drive in drives}
         try:
-            with seen.live or nullcontext():
+            with view.shown():
                 for sample in _samples(polls):
-                    seen.show(by_drive[id(sample.drive)], sample)
+                    watched = by_drive[id(sample.drive)]
+                    watched.take(sample)
+                    seen.take(sample)
+                    view.show(watched, sample)
                     if count is not None and seen.count == count * len(drives):
                         break
         except KeyboardInterrupt:
             interrupted = True
-        told = list(seen.told(polls, interval))
-    seen.end()
+        told = list(seen.told(polls, interval, view.is_lossless))
+    view.end()
     for text in told:
         remark(text)
     if seen.last is not None and seen.missing == seen.count:
@@ -118,82 +117,36 @@ def _samples(polls: Sequence[drivebus.Poll[Any]]) -> Iterator[drivebus.Sample]:
 
 
 class _Seen:
-    """What was shown so far.
+    """What came so far.
 
     Attributes:
-        live: The screen of a terminal; None where nobody watches.
         count: Samples, those that are missing included.
         missing: How many of them are.
         last: Why the last of these is.
     """
 
-    def __init__(self, out: Output, drives: Sequence[Watched]) -> None:
-        self._out = out
-        self._drives = drives
-        self._screen = Screen(drives)
-        self.live = Live(self._screen, console=out.console, auto_refresh=False, screen=True) if out.live else None
+    def __init__(self) -> None:
         self.count = 0
         self.missing = 0
         self.last: drivebus.DrivebusError | None = None
-        self._csv = csv.writer(sys.stdout, lineterminator="\n")
-        self._named = len(drives) > 1
-        self._columns = {
-            name: titled(row, drive.doubtful.get(name, "")) for drive in drives for name, row in drive.rows.items()
-        }
 
-    def show(self, drive: Watched, sample: drivebus.Sample) -> None:
-        """One sample; what is not verified is marked."""
+    def take(self, sample: drivebus.Sample) -> None:
+        """One sample."""
         self.count += 1
         if sample.missing is not None:
             self.missing += 1
             self.last = sample.missing
-        drive.take(sample)
-        self._screen.take(sample.time)
-        if self.live is not None:
-            self.live.refresh()
-            return
-        time = moment(sample.time)
-        if self._out.as_json:
-            self._out.record({"time": time, **self._record(drive, sample)})
-        else:
-            self._write_row(time, drive, sample)
 
-    def end(self) -> None:
-        """Leaves on the terminal what was on its screen last."""
-        if self.live is not None and self.count:
-            self._out.console.print(self._screen)
-
-    def told(self, polls: Sequence[drivebus.Poll[Any]], interval: float) -> Iterator[str]:
-        """What is to be said of *polls* when they are over."""
+    def told(self, polls: Sequence[drivebus.Poll[Any]], interval: float, lossless: bool) -> Iterator[str]:
+        """What is to be said of *polls* when they are over; if *lossless*, also what was left out."""
         if self.missing:
             yield f"{self.missing} of {self.count} samples {'is' if self.missing == 1 else 'are'} missing."
         late, dropped = sum(poll.late for poll in polls), sum(poll.dropped for poll in polls)
         # What waits for an answer that does not come is late too, and no interval helps against that.
         if late and not self.missing:
             yield f"{late} times the line was not free in time for the next sample: {interval:g} s is too short."
-        if dropped and self.live is None:
+        if dropped and lossless:
             yield f"{dropped} samples came faster than they were taken, and are left out."
-
-    def _record(self, drive: Watched, sample: drivebus.Sample) -> dict[str, Any]:
-        whose = {"drive": drive.name} if self._named else {}
-        if sample.missing is not None:
-            return {**whose, "missing": str(sample.missing), "exit_code": exit_code(sample.missing)}
-        values = {name: sample[name] for name in drive.rows}
-        units = {name: row.unit for name, row in drive.rows.items() if row.unit}
-        return {**whose, **values, "units": units, **({"evidence": drive.doubtful} if drive.doubtful else {})}
-
-    def _write_row(self, time: str, drive: Watched, sample: drivebus.Sample) -> None:
-        """A line of CSV, behind one with the names of its columns if it is the first."""
-        whose = [drive.name] if self._named else []
-        if self.count == 1:
-            self._csv.writerow(
-                ["time", *(["drive"] if self._named else []), *map(printable, self._columns.values()), "missing"]
-            )
-        shown = sample.missing is None
-        values = [drive.rows[name].text(sample[name]) if shown and name in drive.rows else "" for name in self._columns]
-        why = "" if sample.missing is None else str(sample.missing)
-        self._csv.writerow([time, *map(printable, (*whose, *values, why))])
-        sys.stdout.flush()
 
 
 COMMANDS = [monitor]

@@ -179,6 +179,9 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, force: bo
     All values are checked before the first is sent. Command registers are refused; use `run`, `stop` and the like. If
     the motor turns, the command asks first.
     """
+    # A stop, which this file has as well, waits for none of it.
+    from drivebus.cli.present.drive_facts import Reading, Written
+
     session.will_write()
     asked = [names.parse_assignment(text) for text in assignments]
     with session.drive() as drive:
@@ -205,18 +208,19 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, force: bo
             drive.write_words(place, word, force=True)
         now = _read_back(drive, wanted)
         kept: list[str] = []
-        rows: list[list[Any]] = []
+        rows: list[Reading] = []
         for name in wanted:
-            known = drive.describe(name)
-            shown = now.get(name)
-            if shown is not None and not session.out.as_json:
-                shown = known.text(shown)
-            rows.append([known.code or known.name, shown, known.unit, known.label])
+            known, there = drive.describe(name), now.get(name)
+            text = "" if there is None else known.text(there)
+            rows.append(Reading(known.code or known.name, known.unit, known.label, None, there, text))
             if name in before and before[name] == now.get(name):
                 kept.append(known.code or known.name)
-        rows += [[f"{place:04X}H", word, "", "unknown register, not read back"] for place, word in words.items()]
+        rows += [
+            Reading(f"{place:04X}H", "", "unknown register, not read back", None, word, str(word))
+            for place, word in words.items()
+        ]
         _say_kept(kept)
-        session.out.rows(["name", "value", "unit", "label"], rows)
+        session.out.render(Written(rows))
 
 
 def _read_back(drive: drivebus.Drive, written: Mapping[str, Any]) -> dict[str, Any]:
@@ -292,12 +296,9 @@ def _done(session: Session, drive: drivebus.Drive, command: str, towards: State 
     except drivebus.DrivebusError as error:
         whose = "" if session.crew else f"{session.called}: "
         _say_lost(f"{whose}{command} was done, but the state afterwards could not be read: {in_commands(error)}")
-    if session.out.as_json:
-        told = ("state", "frequency", "setpoint", "fault")
-        session.out.record(
-            {"command": command, "unit": drive.unit, **{name: getattr(status, name, None) for name in told}}
-        )
-    elif status is not None:
+    told = {name: getattr(status, name, None) for name in ("state", "frequency", "setpoint", "fault")}
+    session.out.record({"command": command, "unit": drive.unit, **told})
+    if status is not None:
         session.out.say(f"{session.called}: {on_the_way(status, towards) or status}")
 
 

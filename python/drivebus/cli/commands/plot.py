@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from drivebus.cli.option_types import Place, Seconds, Whole
-from drivebus.cli.present.output import counted, remark
+from drivebus.cli.present.recordings import Drawn
 from drivebus.cli.session import Session, pass_session
 from drivebus.plot import draw, of_recording
 from drivebus.plot.draw import check
@@ -49,29 +49,7 @@ def plot(
     recording = read(*files)
     picture = of_recording(recording, Path(files[0]).name, names, begin=begin, end=end, points=points)
     draw(picture, picture_file)
-    if session.out.as_json:
-        session.out.record(
-            {
-                "picture": str(picture_file),
-                "complete": recording.complete,
-                "left_out": picture.left_out,
-                "curves": sum(map(len, picture.panels.values())),
-            }
-        )
-        return
-    bits = len({band.drive for band in picture.bands if band.lamp})
-    lamps = f" and {bits} bit{'' if bits == 1 else 's'}" if bits else ""
-    session.out.say(f"{counted(sum(map(len, picture.panels.values())), 'curve')}{lamps} in {picture_file}.")
-    if picture.late:
-        times = "1 time" if picture.late == 1 else f"{picture.late} times"
-        remark(
-            f"The line was busy {times}, so samples are missing there: a curve goes straight to the next "
-            "sample, and a band begins with it."
-        )
-    if picture.left_out:
-        remark(f"Left out, because they were 0 all the time: {', '.join(picture.left_out)}. --only NAME draws them.")
-    if not recording.complete:
-        remark("The recording has no end: it is still written, or was cut off.")
+    session.out.render(Drawn(picture, picture_file, recording.complete))
 
 
 COMMANDS = [plot]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -12,14 +11,12 @@ from drivebus.cli import profile_template
 from drivebus.cli.halts_elsewhere import started_by
 from drivebus.cli.names import complete_profile
 from drivebus.cli.option_types import Place
-from drivebus.cli.present import profile_rules
+from drivebus.cli.present.families import KINDS, Families, FamilyRules, Mistakes
 from drivebus.cli.present.help_format import Listing
 from drivebus.cli.present.output import remark
 from drivebus.cli.session import Session, pass_session
 
 __all__ = ["COMMANDS"]
-
-KINDS = ("registers", "parameters", "faults")
 
 
 @click.group(cls=Listing, invoke_without_command=True)
@@ -29,32 +26,7 @@ def profiles(context: click.Context, session: Session) -> None:
     """List the families of drives that are known. Subcommands show one, check one, or start one of your own."""
     if context.invoked_subcommand is not None:
         return
-    rows: list[list[Any]] = []
-    for name in drivebus.profiles():
-        profile = drivebus.Profile.builtin(name)
-        counts = profile.counts()
-        totals = [counts[kind]["total"] for kind in KINDS]
-        share = _printed(counts)
-        if session.out.as_json:
-            doubtful = [sum(counts[kind][how] for kind in KINDS) for how in ("unverified", "assumed")]
-            rows.append([name, profile.title, profile.kind, *totals, share, *doubtful])
-        else:
-            rows.append([name, profile.title, sum(totals), "" if share is None else f"{int(share * 100)} %"])
-    if session.out.as_json:
-        session.out.rows(["name", "title", "kind", *KINDS, "verified", "unverified", "assumed"], rows)
-        return
-    session.out.rows(["name", "title", "rows", "verified"], rows)
-    session.out.say(
-        "rows: registers, parameters and faults that are known. verified: those that a document of this very family "
-        "prints. `drivebus profiles show NAME` counts those that are unverified and assumed, and has more."
-    )
-
-
-def _printed(counts: dict[str, dict[str, int]]) -> float | None:
-    """The share of rows that a document of the family itself prints, 0.0 to 1.0; None where there are no rows."""
-    total = sum(counts[kind]["total"] for kind in KINDS)
-    doubtful = sum(counts[kind]["unverified"] + counts[kind]["assumed"] for kind in KINDS)
-    return round((total - doubtful) / total, 3) if total else None
+    session.out.render(Families([drivebus.Profile.builtin(name) for name in drivebus.profiles()]))
 
 
 @profiles.command()
@@ -62,17 +34,7 @@ def _printed(counts: dict[str, dict[str, int]]) -> float | None:
 @pass_session
 def show(session: Session, family: str) -> None:
     """Show the rules of a family (or a folder) in words, and how well its rows are known."""
-    profile = drivebus.Profile.find(family)
-    counts = profile.counts()
-    if session.out.as_json:
-        session.out.record({**profile_rules.known(profile), "counts": counts})
-        return
-    for title, lines in profile_rules.in_words(profile):
-        session.out.heading(title)
-        for line in lines:
-            session.out.say(f"  {line}")
-    session.out.heading("Rows, and how well they are known")
-    session.out.rows(profile_rules.COUNTED, [profile_rules.counted(kind, counts[kind]) for kind in KINDS])
+    session.out.render(FamilyRules(drivebus.Profile.find(family)))
 
 
 @profiles.command()
@@ -86,11 +48,7 @@ def check(context: click.Context, session: Session, folder: Path) -> None:
     mistake, but a drive of that family at this address would run. A profile is read, never executed.
     """
     problems = drivebus.Profile.check(folder)
-    for problem in problems:
-        if session.out.as_json:
-            session.out.record(problem)
-        else:
-            session.out.say(_placed(problem))
+    session.out.render(Mistakes(problems))
     if problems:
         some = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
         remark(f"Error: {folder} has {some}; the profile is not used until all is right.")
@@ -107,11 +65,6 @@ def _warn(profile: drivebus.Profile) -> None:
     """Says which halts of *profile* are a start to other families."""
     for each in started_by(profile):
         remark(f"Warning: {profile.name}: {each}; it starts such a drive, where one hangs at the address.")
-
-
-def _placed(problem: dict[str, Any]) -> str:
-    where = problem["file"] if problem["line"] is None else f"{problem['file']}, line {problem['line']}"
-    return f"{where}: {problem['reason']}"
 
 
 @profiles.command()
@@ -141,11 +94,9 @@ def new(session: Session, folder: Path, like: str | None, overlay: str | None) -
                 file.write(text)
     except OSError as error:
         raise click.UsageError(f"{error.filename or folder}: {error.strerror or error}") from error
-    if session.out.as_json:
-        session.out.record({"folder": str(folder), "files": list(written)})
-    else:
-        session.out.say(f"{folder}: {', '.join(written)}")
-        session.out.say(f"Fill them in, then: drivebus profiles check {folder}")
+    session.out.record({"folder": str(folder), "files": list(written)})
+    session.out.say(f"{folder}: {', '.join(written)}")
+    session.out.say(f"Fill them in, then: drivebus profiles check {folder}")
 
 
 @profiles.command()

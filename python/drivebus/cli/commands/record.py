@@ -16,6 +16,7 @@ from drivebus.cli import names
 from drivebus.cli.open_lines import opened_lines
 from drivebus.cli.option_types import Place, Seconds, Size, Whole
 from drivebus.cli.present.output import counted, printable, remark
+from drivebus.cli.present.recordings import Recorded
 from drivebus.cli.session import Session, pass_session
 from drivebus.cli.signals import ENDS, heeded
 from drivebus.record.formats import format_of
@@ -87,8 +88,8 @@ def record(
         now = lines[0][0].now
         began = now()
         shown = _Shown(recorder, now)
-        if not out.as_json and not out.live:
-            remark(f"Recording {counted(len(drives), 'drive')} into {target}. Ctrl-C ends it.")
+        if not out.live:
+            out.remark(f"Recording {counted(len(drives), 'drive')} into {target}. Ctrl-C ends it.")
         try:
             with heeded(ENDS, _end), ExitStack() as live:
                 if out.live:
@@ -171,25 +172,7 @@ def _bytes(size: int) -> str:
 
 def _tell(session: Session, recorder: drivebus.Recorder, problem: str) -> None:
     """Says what was recorded."""
-    files = [str(path) for path in recorder.files]
-    told = {
-        "files": files,
-        "rows": recorder.rows,
-        "gaps": recorder.gaps,
-        "missing": recorder.missing,
-        "late": recorder.late,
-        "lost": recorder.lost,
-        "told": recorder.told,
-    }
-    if session.out.as_json:
-        session.out.record(told)
-    else:
-        gaps = f", {counted(recorder.gaps, 'gap')} ({recorder.missing} samples missing)"
-        into = files[0] if len(files) == 1 else f"{files[0]} and {len(files) - 1} more"
-        whole = "" if recorder.late or recorder.lost else ", no gap"
-        session.out.say(f"{recorder.rows} rows in {into}{gaps if recorder.gaps else whole}.")
-        if recorder.late:
-            _tell_late(recorder)
+    session.out.render(Recorded(recorder))
     if problem:
         remark(f"Error: {problem}")
     elif recorder.lost:
@@ -201,16 +184,6 @@ def _tell(session: Session, recorder: drivebus.Recorder, problem: str) -> None:
     if not recorder.rows and recorder.missing:
         remark(f"Error: no drive answered. `{session.doctor()}` looks at adapter and line.")
         raise click.exceptions.Exit(3)
-
-
-def _tell_late(recorder: drivebus.Recorder) -> None:
-    """Says that the line was too busy for what was asked, and what helps."""
-    taken, missing = recorder.rows + recorder.lost, recorder.missing
-    unanswered = f", {missing} without an answer" if missing else ""
-    remark(
-        f"{taken + missing + recorder.late} samples asked for, {taken} taken{unanswered}: {recorder.late} came too "
-        "late, the line was busy. A longer --interval, fewer registers or fewer programs on the line help."
-    )
 
 
 COMMANDS = [record]

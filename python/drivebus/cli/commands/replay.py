@@ -83,11 +83,9 @@ def replay(session: Session, file: str, transport: str, duration: float | None) 
     with Replay(exchanges, line, transport, Missing(remark).take) as units:
         answered = sum(exchange.answer is not None for exchange in exchanges if exchange.request is not None)
         with suppress(KeyboardInterrupt):
-            if session.out.as_json:
-                session.out.record({"port": units.port, "exchanges": answered})
-            else:
-                session.out.say(units.port)
-                remark(f"{answered} answers of {file} at {units.port}. Ctrl-C ends it.")
+            session.out.record({"port": units.port, "exchanges": answered})
+            session.out.say(units.port)
+            session.out.remark(f"{answered} answers of {file} at {units.port}. Ctrl-C ends it.")
             units.wait(duration)
     unknown = sorted(units.unknown)
     if unknown:

@@ -102,8 +102,8 @@ def sniff(
             Live(screen, console=out.console, refresh_per_second=1 / _EACH, screen=True) if screen else nullcontext()
         )
         quiet = target == "-" or (table and live is not None)
-        if not out.as_json and live is None:
-            remark(f"Listening on {port}, {settings}. Ctrl-C ends it.")
+        if live is None:
+            out.remark(f"Listening on {port}, {settings}. Ctrl-C ends it.")
         try:
             for exchange in heard:
                 figures.take(exchange)
@@ -168,12 +168,10 @@ def _told(session: Session, figures: Figures, target: str | None, kept: CaptureF
     asked = sum(unit.requests for unit in figures.units.values())
     answered = sum(unit.answers for unit in figures.units.values())
     hints = [in_commands(hint) for hint in figures.hints()]
-    if session.out.as_json:
-        session.out.record({"exchanges": asked, "answered": answered, "noise": figures.noise, "hints": hints})
-    else:
-        remark(f"{counted(asked, 'request')} to {counted(len(figures.units), 'unit')}, {answered} answered.")
-        for hint in hints:
-            remark(f"- {hint}")
+    session.out.record({"exchanges": asked, "answered": answered, "noise": figures.noise, "hints": hints})
+    session.out.remark(f"{counted(asked, 'request')} to {counted(len(figures.units), 'unit')}, {answered} answered.")
+    for hint in hints:
+        session.out.remark(f"- {hint}")
     if not figures.exchanges:
         remark(
             "Nothing was heard: nobody speaks there, the wires are off or crossed, or the adapter only hears itself. "

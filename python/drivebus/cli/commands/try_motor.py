@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, nullcontext, suppress
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -21,9 +20,10 @@ from drivebus.cli import names
 from drivebus.cli.option_types import Amperes, Hertz, Place, Seconds
 from drivebus.cli.present.csv_rows import CsvRows
 from drivebus.cli.present.output import Output, remark
+from drivebus.cli.present.trials import TrialResult
 from drivebus.cli.required_options import NamesAllMissing
 from drivebus.cli.session import Session, force_option, pass_session, yes_option
-from drivebus.trial import RampFigures, SineFigures, StepFigures, Trial
+from drivebus.trial import Trial
 from drivebus.trial.abort_rules import Bounds
 from drivebus.trial.setpoint_courses import Change, Wave
 
@@ -193,7 +193,8 @@ def _do(
                 for text in _now(session, drive, "stopping"):
                     error.add_note(text)
             raise
-        _show(session, drive, trial)
+        turning = "the stop is confirmed; the motor is still slowing down"
+        session.out.render(TrialResult(trial, drive, tuple(_now(session, drive, turning))))
         is_kept = kept is None or kept.is_there()
     if picture is not None:
         from drivebus.plot import draw, of_samples
@@ -273,70 +274,12 @@ def _new(file: str) -> TextIO:
         raise click.UsageError(f"{file} cannot be written: {reason}. The motor was not started") from None
 
 
-def _show(session: Session, drive: drivebus.Drive, trial: Trial) -> None:
-    """The figures, and what the motor does now."""
-    current, at = trial.peak_current or (None, None)
-    if session.out.as_json:
-        session.out.record(
-            {
-                "trial": trial.kind,
-                "unit": drive.unit,
-                **asdict(trial.course),
-                **(asdict(trial.figures) if trial.figures else {}),
-                **({"ramp_setting": trial.ramp_setting} if trial.kind == "ramp" else {}),
-                "peak_current": current,
-                "peak_current_at": at,
-                "samples": len(trial.samples),
-                "interval": trial.samples.interval,
-                "aborted": trial.aborted,
-            }
-        )
-        return
-    told = dict(_figures(trial))
-    if current is not None and at is not None:
-        told["peak current"] = f"{drive.describe(trial.roles.current or '').text(current)} A, at {at:.2f} s"
-    interval = trial.samples.interval
-    told["samples"] = f"{len(trial.samples)}{'' if interval is None else f', one each {interval * 1000:.0f} ms'}"
-    session.out.facts(told)
-    for text in _now(session, drive, "the stop is confirmed; the motor is still slowing down"):
-        session.out.say(text)
-
-
 def _now(session: Session, drive: drivebus.Drive, turning: str) -> Iterator[str]:
     """What the motor does now, if the drive tells; in the words *turning*, if it still turns."""
     with suppress(drivebus.DrivebusError):
         status = drive.status()
         where = "" if status.frequency is None else f", {status.frequency:.2f} Hz"
         yield f"{session.called}: {f'{turning}{where}' if status.state.running else status}"
-
-
-def _figures(trial: Trial) -> Iterator[tuple[str, str]]:
-    """The figures in words, with their units."""
-    figures = trial.figures
-    if isinstance(figures, StepFigures):
-        yield "rise time, 10 to 90 %", _seconds(figures.rise_time)
-        yield "overshoot", f"{figures.overshoot:.1f} %"
-        yield "settling time, within 2 %", _seconds(figures.settling_time)
-        yield "steady-state error", _hertz(figures.steady_state_error)
-    elif isinstance(figures, RampFigures):
-        yield "rate", "not reached" if figures.rate is None else f"{figures.rate:.3f} Hz/s"
-        yield "the drive's ramp", "not known" if trial.ramp_setting is None else f"{trial.ramp_setting:.3f} Hz/s"
-        yield "steady-state error", _hertz(figures.steady_state_error)
-    elif isinstance(figures, SineFigures):
-        yield "gain", f"{figures.gain:.3f}"
-        yield "phase lag", f"{figures.phase_lag:.1f}°, {figures.lag:.3f} s"
-        yield "offset", _hertz(figures.offset)
-    elif trial.aborted is None:
-        yield "figures", "too few samples"
-
-
-def _seconds(seconds: float | None) -> str:
-    return "not reached" if seconds is None else f"{seconds:.2f} s"
-
-
-def _hertz(hz: float) -> str:
-    # No -0.00.
-    return f"{round(hz, 2) + 0.0:.2f} Hz"
 
 
 COMMANDS = [trying]

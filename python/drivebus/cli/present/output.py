@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import click
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-__all__ = ["Output", "about", "counted", "laid_out", "plain", "printable", "remark", "show"]
+__all__ = ["Output", "Result", "about", "counted", "laid_out", "plain", "printable", "remark", "show"]
 
 _PIPE_WIDTH = 200
 """Characters a line may have where no terminal limits it: nothing is cut."""
@@ -37,6 +37,16 @@ _NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
 _BETWEEN = 2
 """Blanks between two columns of a table."""
+
+
+class Result(Protocol):
+    """What a command found: the same for a program and for people. A command makes one, and shows nothing itself."""
+
+    def records(self) -> Iterable[Mapping[str, Any]]:
+        """Its objects for a program, one a line."""
+
+    def lay_out(self, out: Output) -> None:
+        """Shows people what it says, on *out*."""
 
 
 class Output:
@@ -81,8 +91,28 @@ class Output:
         """Whether a person watches: a terminal, and no JSON."""
         return not self.as_json and self._held is None and self.console.is_terminal
 
+    def render(self, result: Result) -> None:
+        """Shows *result*, to whom it is for."""
+        if not self.as_json:
+            result.lay_out(self)
+            return
+        for values in result.records():
+            self.record(values)
+
+    def preview(self, result: Result) -> None:
+        """Shows people what *result* is before it is settled; nothing in JSON."""
+        if not self.as_json:
+            result.lay_out(self)
+
+    def remark(self, text: str) -> None:
+        """A line on standard error for people; nothing in JSON."""
+        if not self.as_json:
+            remark(text)
+
     def record(self, values: Mapping[str, Any]) -> None:
-        """One JSON object."""
+        """One JSON object; nothing for people."""
+        if not self.as_json:
+            return
         import json
 
         told = {"drive": self._drive} if self._drive else {}

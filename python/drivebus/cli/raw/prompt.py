@@ -33,8 +33,9 @@ def prompt(session: Session, bus: drivebus.Bus, force: bool, yes: bool) -> None:
     families = UnitFamilies(session, bus)
     sender = Sender(session, bus, families, force, yes)
     unit = session.unit
-    if not session.out.as_json:
-        remark(f"Requests to {session.port}: unit and PDU in hex, without CRC. `help` shows the rest, Ctrl-D ends.")
+    session.out.remark(
+        f"Requests to {session.port}: unit and PDU in hex, without CRC. `help` shows the rest, Ctrl-D ends."
+    )
     with Editing(families) as editing:
         while True:
             editing.unit = unit

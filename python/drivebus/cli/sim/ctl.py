@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ import click
 
 import drivebus
 from drivebus.cli.present.help_format import Listing
+from drivebus.cli.present.output import Output
 from drivebus.cli.session import Session, parse_format, pass_session
 from drivebus.cli.sim.control_socket import Order, ask, running
 from drivebus.cli.sim.rates import rates_of
@@ -36,7 +39,7 @@ def _send(session: Session, **order: Any) -> None:
     except OSError as error:
         why = f"the simulation does not answer ({error}); whether it obeyed is not known"
         raise drivebus.PortError(why, errno=error.errno) from error
-    _show(session, now)
+    session.out.render(_Simulation(now))
 
 
 def _meant(which: str | None) -> Path:
@@ -62,23 +65,31 @@ def _is_called(told: Order, name: str) -> bool:
     return name in (told.get("port"), told.get("leads_to"), str(told.get("pid")))
 
 
-def _show(session: Session, now: Order) -> None:
-    """What is so in a simulation."""
-    if session.out.as_json:
-        session.out.record(now)
-        return
-    faults = ", ".join(f"{kind} {rate:g}" for kind, rate in now["faults"].items())
-    session.out.facts(
-        {
-            "port": now["port"] if now["plugged"] else f"{now['port']}, unplugged",
-            **({"ear": now["ear"]} if now.get("ear") else {}),
-            "settings": now["settings"],
-            "line_faults": faults or "none",
-        }
-    )
-    session.out.say("")
-    columns = ["unit", "family", "state", "frequency", "load", "fault"]
-    session.out.rows(columns, [_row(drive) for drive in now["units"]])
+@dataclass(frozen=True)
+class _Simulation:
+    """What is so in a simulation, as it told it itself."""
+
+    told: Order
+
+    def records(self) -> Iterator[Order]:
+        """All of it."""
+        yield self.told
+
+    def lay_out(self, out: Output) -> None:
+        """The line, and the drives on it."""
+        told = self.told
+        faults = ", ".join(f"{kind} {rate:g}" for kind, rate in told["faults"].items())
+        out.facts(
+            {
+                "port": told["port"] if told["plugged"] else f"{told['port']}, unplugged",
+                **({"ear": told["ear"]} if told.get("ear") else {}),
+                "settings": told["settings"],
+                "line_faults": faults or "none",
+            }
+        )
+        out.say("")
+        columns = ["unit", "family", "state", "frequency", "load", "fault"]
+        out.rows(columns, [_row(drive) for drive in told["units"]])
 
 
 def _row(drive: Order) -> list[Any]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 import shlex
 import signal
+from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import Any
 
 import click
@@ -14,7 +16,7 @@ import drivebus
 from drivebus.cli.names import complete_units
 from drivebus.cli.option_types import Place, Whole
 from drivebus.cli.present.help_format import Listing
-from drivebus.cli.present.output import remark
+from drivebus.cli.present.output import Output, remark
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, pass_session
 from drivebus.cli.sim.control_commands import Orders, in_words
 from drivebus.cli.sim.control_socket import open_to_orders
@@ -133,7 +135,7 @@ def sim(
             with ExitStack() as open_things:
                 _take_orders(open_things, orders)
                 # Whoever reads the port may end it at once.
-                _say_what_is_served(session, simulator, opened(), heard_at)
+                session.out.render(_Served(simulator, opened(), heard_at, _line_words(session)))
                 Latch().wait()
         except KeyboardInterrupt:
             session.out.say("")
@@ -147,44 +149,69 @@ def _take_orders(open_things: ExitStack, orders: Orders) -> None:
         remark(f"Warning: this simulation takes no orders by `drivebus sim ctl`: {error}")
 
 
-def _say_what_is_served(session: Session, simulator: drivebus.Simulator, opened: str, heard_at: str | None) -> None:
-    """What to open, what is there, and what to do next."""
-    drives = {unit: simulator.drive(unit).profile for unit in simulator.units}
-    settings = in_words(simulator.format)
-    if session.out.as_json:
-        told: dict[str, Any] = {"port": opened, "leads_to": simulator.port, "units": drives, "settings": settings}
-        if heard_at is not None:
-            told |= {"ear": heard_at, "ear_leads_to": simulator.ear}
-        session.out.record({**told, "seed": simulator.seed, "faults": simulator.line.faults})
-        return
-    session.out.say(opened)
-    if opened != simulator.port:
-        session.out.say(f"Leads to: {simulator.port}")
-    if heard_at is not None:
-        leads = "" if heard_at == simulator.ear else f", leads to {simulator.ear}"
-        session.out.say(f"Ear: {heard_at}{leads}")
-    for unit, family in drives.items():
-        session.out.say(f"Unit {unit}: {family}")
-    session.out.say(f"Settings: {settings}")
-    if simulator.line.faults:
-        session.out.say("Faults: " + ", ".join(f"{kind} {rate:g}" for kind, rate in simulator.line.faults.items()))
-    session.out.say(f"Seed: {simulator.seed}")
-    first = simulator.units[0]
-    which = "" if first == 1 else f" --unit {first}"
-    words = "".join(f" --{name} {value}" for name, value, usual in _settings_of(session) if value != usual)
-    session.out.say(f"Try in another window: `drivebus --port {shlex.quote(opened)}{words}{which} info`")
-    if heard_at is not None:
-        session.out.say(f"Hear it: `drivebus{words} sniff {shlex.quote(heard_at)}`")
-    session.out.say("Trip, load, unplug: `drivebus sim ctl --help`")
-    session.out.say("Ctrl-C ends it.")
+@dataclass(frozen=True)
+class _Served:
+    """What is simulated.
+
+    Attributes:
+        simulator: That.
+        opened: What other programs open.
+        ear: What they open to listen; None for nothing.
+        line_words: The options for the line, as they are typed.
+    """
+
+    simulator: drivebus.Simulator
+    opened: str
+    ear: str | None
+    line_words: str
+
+    def _drives(self) -> dict[int, str]:
+        return {unit: self.simulator.drive(unit).profile for unit in self.simulator.units}
+
+    def records(self) -> Iterator[dict[str, Any]]:
+        """All of it in one object."""
+        simulator = self.simulator
+        yield {
+            "port": self.opened,
+            "leads_to": simulator.port,
+            "units": self._drives(),
+            "settings": in_words(simulator.format),
+            **({} if self.ear is None else {"ear": self.ear, "ear_leads_to": simulator.ear}),
+            "seed": simulator.seed,
+            "faults": simulator.line.faults,
+        }
+
+    def lay_out(self, out: Output) -> None:
+        """What to open, what is there, and what to do next."""
+        simulator, opened, ear = self.simulator, self.opened, self.ear
+        out.say(opened)
+        if opened != simulator.port:
+            out.say(f"Leads to: {simulator.port}")
+        if ear is not None:
+            leads = "" if ear == simulator.ear else f", leads to {simulator.ear}"
+            out.say(f"Ear: {ear}{leads}")
+        for unit, family in self._drives().items():
+            out.say(f"Unit {unit}: {family}")
+        out.say(f"Settings: {in_words(simulator.format)}")
+        if simulator.line.faults:
+            out.say("Faults: " + ", ".join(f"{kind} {rate:g}" for kind, rate in simulator.line.faults.items()))
+        out.say(f"Seed: {simulator.seed}")
+        first = simulator.units[0]
+        which = "" if first == 1 else f" --unit {first}"
+        out.say(f"Try in another window: `drivebus --port {shlex.quote(opened)}{self.line_words}{which} info`")
+        if ear is not None:
+            out.say(f"Hear it: `drivebus{self.line_words} sniff {shlex.quote(ear)}`")
+        out.say("Trip, load, unplug: `drivebus sim ctl --help`")
+        out.say("Ctrl-C ends it.")
 
 
-def _settings_of(session: Session) -> list[tuple[str, object, object]]:
-    """The options for the line: name, value and what is usual."""
-    return [
+def _line_words(session: Session) -> str:
+    """The options for the line that are not as usual, as they are typed."""
+    settings = [
         ("baud", session.baud, DEFAULT_BAUD),
         ("format", "".join(session.line_format), "".join(DEFAULT_FORMAT)),
     ]
+    return "".join(f" --{name} {value}" for name, value, usual in settings if value != usual)
 
 
 def _simulated(text: str) -> dict[int, str]:
