@@ -144,7 +144,7 @@ OPERATIONS = [
     "deferred_signals",
     "program_end",
     "stop_proof",
-    "unit",
+    "drive_view",
     "aim",
     "raw_words",
     "unit_variants",

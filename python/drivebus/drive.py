@@ -31,10 +31,10 @@ from drivebus.operations import (
 )
 from drivebus.operations.by_name import by_name
 from drivebus.operations.drive_base import DriveFace, blocking, documented_by, unit_of
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.former_names import BlockingFormerNames
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
-from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
 from drivebus.strict_attributes import known_only
 from drivebus.values import Value
@@ -75,7 +75,7 @@ class Drive(BlockingFormerNames):
     ) -> None:
         self.bus = bus
         super().__init__(
-            Unit.create(
+            DriveView.create(
                 BlockingBus(bus), unit, profile, identification, unverified=unverified, trust_profile=trust_profile
             )
         )
@@ -273,7 +273,7 @@ class Drive(BlockingFormerNames):
     def _moving(
         self,
         start: Callable[[], None],
-        end: Callable[[Unit, float], Coroutine[Any, Any, None]],
+        end: Callable[[DriveView, float], Coroutine[Any, Any, None]],
         unverified: bool,
         standstill: float | None,
         within: float,

@@ -41,7 +41,7 @@ class Frame:
     Attributes:
         kind: `"read"`, `"write"`, `"write_many"`, `"echo"` (requests, and answers that look like them),
             `"read_answer"`, `"write_many_answer"`, `"exception"` or `"other"`.
-        unit: Unit address, 0 for a broadcast.
+        unit: DriveView address, 0 for a broadcast.
         function: Function code; of an exception, the one that was refused.
         crc: The CRC it carries, which is right.
         table: `"input"`, `"coil"` or `"discrete"`; None where it is the holding registers.

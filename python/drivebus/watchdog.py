@@ -13,7 +13,7 @@ from types import TracebackType
 
 from drivebus.line.blocking import at_once
 from drivebus.operations.bus_timeout import BusTimeout
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.strict_attributes import known_only
 
 __all__ = ["Watchdog"]
@@ -26,7 +26,7 @@ class Watchdog(BusTimeout):
     `Drive.watchdog` makes one. Its parameters are in force when it has been made. Attributes as in `BusTimeout`.
     """
 
-    def __init__(self, drive: Unit, timeout: float, action: str) -> None:
+    def __init__(self, drive: DriveView, timeout: float, action: str) -> None:
         super().__init__(drive, timeout, action)
         at_once(self.set())
         self._closed = False

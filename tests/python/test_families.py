@@ -1,6 +1,7 @@
 """Every family against `tests/vectors/families.toml`, a table typed from the manuals, through the Python API.
 
-Rust walks the same file in `crates/drives/tests/families.rs`. The format is explained in `tests/vectors/README.md`.
+Rust walks the same file in `crates/drives/tests/shared_vectors/families.rs`. The format is explained in
+`tests/vectors/README.md`.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ import pytest
 from fuzz.drive import drive
 
 from drivebus.operations import commands, parameter_writes
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.halting import Halt
-from drivebus.operations.unit import Unit
 
 CORPUS = Path(__file__).parents[2] / "fuzz" / "corpus" / "drive"
 FILES = sorted(CORPUS.iterdir())
@@ -68,7 +68,7 @@ def test_a_coast_that_is_proved_by_nothing_is_found(monkeypatch: pytest.MonkeyPa
 def test_a_write_that_is_reported_done_and_was_not_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     write = parameter_writes.write
 
-    async def loses(unit: Unit, run: Sequence[parameter_writes.Planned], store: bool) -> None:
+    async def loses(unit: DriveView, run: Sequence[parameter_writes.Planned], store: bool) -> None:
         if all(item.raw <= MOST_AT_FIRST for item in run):
             await write(unit, run, store)
 

@@ -22,8 +22,8 @@ import pytest
 import drivebus
 from drivebus import _native
 from drivebus.line.blocking import BlockingBus
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.last_will import LastWill
-from drivebus.operations.unit import Unit
 
 from .workshop import Said, Workshop
 
@@ -408,7 +408,7 @@ def test_what_is_left_halts_each_family(family: str) -> None:
             line = Line()
 
         profile = drivebus.Profile.find(family)
-        unit = Unit.create(Face(bus), 1, profile, None, unverified=True, trust_profile=True)
+        unit = DriveView.create(Face(bus), 1, profile, None, unverified=True, trust_profile=True)
         LastWill(unit).leave()
         wanted = [way for way in ("stop", "coast") if way in profile.commands()]
         assert len(left[0] if left else []) == len(wanted)

@@ -16,7 +16,7 @@ import pytest
 import drivebus
 from drivebus import Bus, Drive, Simulator
 from drivebus.operations import registers
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 
 RAM, ACTION, TIMEOUT = 0x8000, 0x0E05, 0x0E04
 CE = 18
@@ -176,7 +176,7 @@ def test_one_that_is_interrupted_gives_back_what_the_drive_had(
     snapshot = registers.snapshot
     asked: list[str] = []
 
-    async def interrupted(unit: Unit, *names: str) -> drivebus.Snapshot:
+    async def interrupted(unit: DriveView, *names: str) -> drivebus.Snapshot:
         asked.extend(names)
         if len(asked) > len(names):
             raise KeyboardInterrupt

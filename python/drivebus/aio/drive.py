@@ -27,10 +27,10 @@ from drivebus.operations import (
 )
 from drivebus.operations.by_name import by_name
 from drivebus.operations.drive_base import awaited, documented_by, unit_of
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.former_names import AwaitedFormerNames
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
-from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
 from drivebus.strict_attributes import known_only
 from drivebus.values import Value
@@ -60,7 +60,7 @@ class Drive(AwaitedFormerNames):
     ) -> None:
         self.bus = bus
         super().__init__(
-            Unit.create(bus, unit, profile, identification, unverified=unverified, trust_profile=trust_profile)
+            DriveView.create(bus, unit, profile, identification, unverified=unverified, trust_profile=trust_profile)
         )
 
     # Names that are also rooms come after what is taken from the room.

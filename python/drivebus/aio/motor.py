@@ -5,8 +5,8 @@ from __future__ import annotations
 from types import TracebackType
 
 from drivebus.aio.awake import Awake
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.turning import MotorFace, turning_of
-from drivebus.operations.unit import Unit
 from drivebus.strict_attributes import known_only
 
 __all__ = ["Motor"]
@@ -16,7 +16,7 @@ __all__ = ["Motor"]
 class Motor(MotorFace):
     """The motor of a drive inside one `async with` block. `Drive.motor` makes it; otherwise as `drivebus.Motor`."""
 
-    def __init__(self, unit: Unit, within: float) -> None:
+    def __init__(self, unit: DriveView, within: float) -> None:
         super().__init__(unit, within)
         self._awake: Awake | None = None
 

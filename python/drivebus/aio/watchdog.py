@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any
 
 from drivebus.operations.bus_timeout import BusTimeout
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.strict_attributes import known_only
 
 __all__ = ["Watchdog"]
@@ -21,7 +21,7 @@ class Watchdog(BusTimeout):
     `Drive.watchdog` makes one. Attributes as in `drivebus.watchdog.Watchdog`.
     """
 
-    def __init__(self, drive: Unit, timeout: float, action: str) -> None:
+    def __init__(self, drive: DriveView, timeout: float, action: str) -> None:
         super().__init__(drive, timeout, action)
         self._name = f"drivebus watchdog of unit {drive.address}"
         self._task: asyncio.Task[None] | None = None

@@ -16,7 +16,7 @@ from drivebus.backup.rules import Rules
 from drivebus.backup.unread import Unread, refused
 from drivebus.errors import BadArgument, NotAllowed, Refused, WrongDrive
 from drivebus.operations import parameter_writes, raw_words, registers
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 
 __all__ = ["Progress", "origin_of", "take"]
 
@@ -33,7 +33,7 @@ _FIRMWARE = "firmware_version"
 """The parameter or register of this name tells the firmware, where a profile has one."""
 
 
-async def origin_of(unit: Unit) -> Origin:
+async def origin_of(unit: DriveView) -> Origin:
     """Whose parameters are read: what the drive says of itself now."""
     profile = unit.profile
     identification = firmware = None
@@ -57,7 +57,7 @@ async def origin_of(unit: Unit) -> Origin:
     )
 
 
-async def _told(unit: Unit, name: str) -> int | None:
+async def _told(unit: DriveView, name: str) -> int | None:
     """The word of the register *name*; None if the drive has none, or does not tell it.
 
     Raises:
@@ -77,7 +77,7 @@ async def _told(unit: Unit, name: str) -> int | None:
     raise AssertionError  # the second read returned or raised
 
 
-async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, progress: Progress | None) -> Backup:
+async def take(unit: DriveView, path: Path | None, *, resume: bool, force: bool, progress: Progress | None) -> Backup:
     """Reads every parameter that can be read. What was read before a break is not read again.
 
     What was lost or refused for another reason than that it is not there, or closed, leaves the file's `.part`.
@@ -148,7 +148,7 @@ async def take(unit: Unit, path: Path | None, *, resume: bool, force: bool, prog
     return backup
 
 
-def _check_old(path: Path, origin: Origin, unit: Unit, force: bool) -> None:
+def _check_old(path: Path, origin: Origin, unit: DriveView, force: bool) -> None:
     """Refuses to put a backup in the place of another drive's, or of what is none."""
     if atomic_file.is_there(path) and not path.is_file():
         raise BadArgument(f"{path} is not a file, and a backup cannot take its place; nothing was read")
@@ -172,7 +172,7 @@ def _check_old(path: Path, origin: Origin, unit: Unit, force: bool) -> None:
         )
 
 
-def _begun(part: Path, origin: Origin, unit: Unit) -> Backup | None:
+def _begun(part: Path, origin: Origin, unit: DriveView) -> Backup | None:
     """What was read before a break, if it was read of this drive."""
     if not atomic_file.is_there(part):
         return None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from drivebus import checks
 from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, WrongDrive
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 
 # Every drive has these three, and few programs use them: what they need is loaded when one is called.
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ BackupOrPath: TypeAlias = "Backup | str | os.PathLike[str]"
 
 
 async def backup(
-    unit: Unit,
+    unit: DriveView,
     path: str | os.PathLike[str] | None = None,
     resume: bool = True,
     progress: Progress | None = None,
@@ -64,7 +64,7 @@ async def backup(
 
 
 async def restore(
-    unit: Unit,
+    unit: DriveView,
     backup: BackupOrPath,
     dry_run: bool = False,
     *,
@@ -118,7 +118,7 @@ async def restore(
 
 
 async def diff(
-    unit: Unit,
+    unit: DriveView,
     backup: BackupOrPath | None = None,
     *,
     everything: bool = False,
@@ -182,7 +182,7 @@ async def diff(
     return found
 
 
-def _kept(unit: Unit, backup: BackupOrPath, force: bool = False) -> Backup:
+def _kept(unit: DriveView, backup: BackupOrPath, force: bool = False) -> Backup:
     """*backup* in the words of this drive's family."""
     from drivebus.backup.model import Backup
 

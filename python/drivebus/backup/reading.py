@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from drivebus.backup.unread import Unread, lost, refused
 from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.operations import raw_words as bus_words
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 
 __all__ = ["Reader", "Words"]
 
@@ -40,7 +40,7 @@ class Reader:
     What was lost is asked for once more, after all others, and cut in two only then.
     """
 
-    def __init__(self, unit: Unit, codes: Sequence[str]) -> None:
+    def __init__(self, unit: DriveView, codes: Sequence[str]) -> None:
         self._unit = unit
         self._waiting = [list(codes)] if codes else []
         self._planned: list[tuple[int, int, list[str]]] = []

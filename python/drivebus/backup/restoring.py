@@ -22,7 +22,7 @@ from drivebus.backup.text import worded
 from drivebus.backup.writing import place, write
 from drivebus.errors import LINE_ERRORS, BadArgument, NotAllowed, NotReady, Refused, WrongDrive
 from drivebus.operations import parameter_writes, state
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.profile.refusals import means
 
 __all__ = ["Restore"]
@@ -34,7 +34,9 @@ _HAD = {"restored": "it was written and read back", "same": "the drive had it"}
 class Restore:
     """One restore of one drive."""
 
-    def __init__(self, unit: Unit, backup: Backup, *, dry_run: bool, twice: bool, progress: Progress | None) -> None:
+    def __init__(
+        self, unit: DriveView, backup: Backup, *, dry_run: bool, twice: bool, progress: Progress | None
+    ) -> None:
         self._unit = unit
         self._profile = unit.profile
         self._backup = backup

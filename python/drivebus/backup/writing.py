@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from drivebus.errors import LINE_ERRORS, Refused, Unverified
 from drivebus.operations import parameter_writes, raw_words
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.profile.refusals import means
 
 __all__ = ["place", "write"]
@@ -13,7 +13,7 @@ _ATTEMPTS = 3
 """How often a write is sent that the drive shows not to have heard."""
 
 
-async def write(unit: Unit, code: str, raw: int, before: int, *, store: bool) -> int:
+async def write(unit: DriveView, code: str, raw: int, before: int, *, store: bool) -> int:
     """Writes *raw* in place of *before*, for good if *store*, and returns what the drive then shows.
 
     What has two words can only be read, so one word it is.
@@ -45,7 +45,7 @@ async def write(unit: Unit, code: str, raw: int, before: int, *, store: bool) ->
     return await _look(unit, code)
 
 
-def place(unit: Unit, code: str, *, store: bool) -> int:
+def place(unit: DriveView, code: str, *, store: bool) -> int:
     """Where *code* is written for good, or to RAM alone.
 
     Raises:
@@ -60,12 +60,12 @@ def place(unit: Unit, code: str, *, store: bool) -> int:
     raise Unverified(f"how {profile.title} keeps a parameter is not verified: {memory.reason}")
 
 
-async def _look(unit: Unit, code: str) -> int:
+async def _look(unit: DriveView, code: str) -> int:
     [word] = await raw_words.read_words(unit, unit.profile.address(code))
     return word
 
 
-async def _put(unit: Unit, code: str, address: int, word: int, *, store: bool) -> None:
+async def _put(unit: DriveView, code: str, address: int, word: int, *, store: bool) -> None:
     """Writes the word of a parameter, and remembers to which memory."""
     known = unit.profile.describe(code)
     if not store:

@@ -62,7 +62,7 @@ class Session:
         port: What to open, or None if it was not given.
         baud: Bits per second.
         line_format: Data bits, parity and stop bits, such as `("8", "E", "1")`.
-        unit: Unit address.
+        unit: DriveView address.
         profile: Name or folder of a profile; None asks the drive.
         out: Where results go.
         rs485: Who switches the direction, as `drivebus.Bus` has it: `"kernel"`, `"rts"`, `"auto"`; None: the adapter.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from drivebus import checks
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 
 # Every drive has this, and few programs use it: what it needs is loaded when it is called.
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ __all__ = ["discover"]
 
 
 async def discover(
-    unit: Unit,
+    unit: DriveView,
     folder: str | os.PathLike[str] | None = None,
     *,
     groups: Sequence[str] | None = None,

@@ -14,7 +14,7 @@ from drivebus.discovery.group_scan import LAST, Walk
 from drivebus.discovery.progress_file import Group, ProgressFile
 from drivebus.errors import BadAnswer, BadArgument, NoAnswer, Refused, WrongDrive
 from drivebus.operations import raw_words
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 
 __all__ = ["Progress", "search"]
 
@@ -32,7 +32,7 @@ drive was busy, or that the request came damaged, counts as that."""
 
 
 async def search(
-    unit: Unit,
+    unit: DriveView,
     place: Path | None,
     *,
     groups: Sequence[str] | None,
@@ -74,7 +74,7 @@ async def search(
     return found
 
 
-def _is_unchanged(unit: Unit, place: Path, base: str | None) -> bool:
+def _is_unchanged(unit: DriveView, place: Path, base: str | None) -> bool:
     """Whether *place* is what an earlier call made that did not settle all, and nobody edited it."""
     if not (place.name and place.is_dir() and atomic_file.is_there(atomic_file.part_of(place))):
         return False
@@ -91,7 +91,7 @@ def _is_unchanged(unit: Unit, place: Path, base: str | None) -> bool:
 class _Search:
     """The reads of one discovery."""
 
-    def __init__(self, unit: Unit, kept: ProgressFile) -> None:
+    def __init__(self, unit: DriveView, kept: ProgressFile) -> None:
         self._unit = unit
         self._kept = kept
 
@@ -190,7 +190,7 @@ class _Search:
         return True
 
 
-def _groups(unit: Unit, groups: Sequence[str] | None) -> list[int]:
+def _groups(unit: DriveView, groups: Sequence[str] | None) -> list[int]:
     """The numbers of *groups*, or of all that the family has.
 
     Raises:
@@ -216,7 +216,7 @@ def _groups(unit: Unit, groups: Sequence[str] | None) -> list[int]:
     return sorted({known[group] for group in groups})
 
 
-def _result(unit: Unit, kept: ProgressFile, wanted: Sequence[int]) -> Discovery:
+def _result(unit: DriveView, kept: ProgressFile, wanted: Sequence[int]) -> Discovery:
     """What was found in the groups that were *wanted*, by the codes that the profile has for them."""
     profile = unit.profile
     rows = [profile.describe(name) for name in profile.names()]

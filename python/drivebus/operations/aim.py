@@ -18,7 +18,7 @@ from drivebus.identify.harm import halt_of, harmed, harms
 from drivebus.identify.refusals import answer_at, answer_once
 from drivebus.line.asking import asking
 from drivebus.line.frames import may_be_of
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile, profiles
 
 __all__ = ["ANSWER_WITHIN", "Aim", "Target", "check_harmless", "goes_out_at_once"]
@@ -38,7 +38,7 @@ class Target(NamedTuple):
         command: The command of that family.
     """
 
-    unit: Unit
+    unit: DriveView
     command: str
 
 
@@ -52,7 +52,7 @@ class Aim:
         heard: The line's clock when the unit last answered what it was asked, or may have.
     """
 
-    def __init__(self, unit: Unit) -> None:
+    def __init__(self, unit: DriveView) -> None:
         self.heard = unit.bus.now()
         self._unit = unit
         self._apart = Apart(unit.profile, trusted=unit.identity.trusted)
@@ -109,7 +109,7 @@ class Aim:
         return Target(unit.taken_for(profile), halt)
 
 
-def goes_out_at_once(unit: Unit, what: str | int) -> bool:
+def goes_out_at_once(unit: DriveView, what: str | int) -> bool:
     """Whether nothing is asked before *what*: the line has identified the unit, or it harms no family.
 
     Where a name is said to be meant, only what the unit itself shows counts for a command. What speaks against a name
@@ -128,7 +128,7 @@ def goes_out_at_once(unit: Unit, what: str | int) -> bool:
     return is_known or not harmed(unit.profile, what)
 
 
-async def check_harmless(unit: Unit, what: str | int) -> None:
+async def check_harmless(unit: DriveView, what: str | int) -> None:
     """Makes sure that *what* is not sent to a unit of a family that it would do harm to.
 
     Sends reads, and only where the line has not identified the unit.
@@ -170,7 +170,7 @@ async def check_harmless(unit: Unit, what: str | int) -> None:
     raise _another(unit, ())
 
 
-def _undecided(unit: Unit, command: str, others: tuple[Profile, ...]) -> NotAllowed:
+def _undecided(unit: DriveView, command: str, others: tuple[Profile, ...]) -> NotAllowed:
     named = f"unit {unit.address} was named {unit.profile.name} ({unit.profile.title})"
     if not others:
         return WrongDrive(
@@ -193,7 +193,7 @@ def _undecided(unit: Unit, command: str, others: tuple[Profile, ...]) -> NotAllo
     )
 
 
-def _another(unit: Unit, others: tuple[Profile, ...]) -> NotAllowed:
+def _another(unit: DriveView, others: tuple[Profile, ...]) -> NotAllowed:
     then = Text(": ask for it as that: ", asked_as(unit.address, (each.name for each in others))) if others else ""
     return WrongDrive(
         Text(

@@ -12,7 +12,7 @@ from drivebus import checks
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.operations import bus_control, commands, raw_words, setpoints, start_checks
 from drivebus.operations.commands import A_WORD
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.values import Description
 
 __all__ = ["bits", "inputs", "outputs", "set_virtual_inputs", "set_virtual_outputs", "special_control"]
@@ -22,7 +22,7 @@ _INPUTS, _OUTPUTS = "input_state", "output_state"
 """What the words of the terminals are called in every family that has them."""
 
 
-async def bits(unit: Unit, name: str, *, unverified: bool = False) -> dict[str, str]:
+async def bits(unit: DriveView, name: str, *, unverified: bool = False) -> dict[str, str]:
     """The bit fields of the word *name*, such as `{"motor": "motor 1"}`; empty for a plain number.
 
     Raises:
@@ -33,18 +33,18 @@ async def bits(unit: Unit, name: str, *, unverified: bool = False) -> dict[str, 
     return unit.profile.fields(name, await _word(unit, name))
 
 
-async def inputs(unit: Unit, *, unverified: bool = False) -> dict[str, bool]:
+async def inputs(unit: DriveView, *, unverified: bool = False) -> dict[str, bool]:
     """The digital inputs by the names of their terminals: True if on. Errors as for `bits`."""
     return await _terminals(unit.trusting(unverified), _INPUTS)
 
 
-async def outputs(unit: Unit, *, unverified: bool = False) -> dict[str, bool]:
+async def outputs(unit: DriveView, *, unverified: bool = False) -> dict[str, bool]:
     """The digital outputs by the names of their terminals: True if on. Errors as for `bits`."""
     return await _terminals(unit.trusting(unverified), _OUTPUTS)
 
 
 async def set_virtual_inputs(
-    unit: Unit, /, *, unverified: bool = False, force: bool = False, **terminals: bool
+    unit: DriveView, /, *, unverified: bool = False, force: bool = False, **terminals: bool
 ) -> None:
     """Sets inputs that the bus gives in the place of terminals: `set_virtual_inputs(S1=True)`.
 
@@ -67,14 +67,14 @@ async def set_virtual_inputs(
 
 
 async def set_virtual_outputs(
-    unit: Unit, /, *, unverified: bool = False, force: bool = False, **terminals: bool
+    unit: DriveView, /, *, unverified: bool = False, force: bool = False, **terminals: bool
 ) -> None:
     """Sets outputs that the bus commands: `set_virtual_outputs(RO1=True)`. Otherwise as `set_virtual_inputs`."""
     await _set_bits(unit.trusting(unverified), "virtual_outputs", terminals, force)
 
 
 async def special_control(
-    unit: Unit, /, *, unverified: bool = False, force: bool = False, **fields: bool | int | str
+    unit: DriveView, /, *, unverified: bool = False, force: bool = False, **fields: bool | int | str
 ) -> None:
     """Writes fields of the special control word: `special_control(motor=2, pre_excitation=True)`.
 
@@ -84,13 +84,13 @@ async def special_control(
     await _set_bits(unit.trusting(unverified), "special_control", fields, force)
 
 
-async def _word(unit: Unit, name: str) -> int:
+async def _word(unit: DriveView, name: str) -> int:
     unit.evidence.require_readable([name])
     [word] = await raw_words.read_words(unit, unit.profile.address(name))
     return word
 
 
-async def _terminals(unit: Unit, name: str) -> dict[str, bool]:
+async def _terminals(unit: DriveView, name: str) -> dict[str, bool]:
     try:
         unit.profile.describe(name)
     except NotAllowed:
@@ -102,7 +102,7 @@ async def _terminals(unit: Unit, name: str) -> dict[str, bool]:
     return {field: bool(word & mask) for field, mask in _masks(unit, name).items()}
 
 
-async def _set_bits(unit: Unit, setpoint: str, given: Mapping[str, object], force: bool) -> None:
+async def _set_bits(unit: DriveView, setpoint: str, given: Mapping[str, object], force: bool) -> None:
     register = setpoints.register_of(unit, setpoint)
     unit.evidence.require_writable(register)
     known, masks = unit.profile.describe(register), _masks(unit, register)
@@ -134,7 +134,7 @@ async def _set_bits(unit: Unit, setpoint: str, given: Mapping[str, object], forc
     await commands.send_word(unit, A_WORD, address, word)
 
 
-def _masks(unit: Unit, name: str) -> dict[str, int]:
+def _masks(unit: DriveView, name: str) -> dict[str, int]:
     """The bits of each field of the word *name*."""
     nothing = unit.profile.fields(name, 0)
     masks = dict.fromkeys(nothing, 0)

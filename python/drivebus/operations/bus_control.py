@@ -11,7 +11,7 @@ from drivebus.advice import Advice, Text, argument, call
 from drivebus.errors import NotReady, Unconfirmed
 from drivebus.operations import parameter_writes, parameters, registers
 from drivebus.operations.by_name import by_name
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.profile.evidence import not_verified
 from drivebus.profile.facts import Setting
 from drivebus.values import Control, ControlItem
@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 
-async def check_control(unit: Unit, setpoint: str | None = None, *, unverified: bool = False) -> Control:
+async def check_control(unit: DriveView, setpoint: str | None = None, *, unverified: bool = False) -> Control:
     """Checks whether the drive is set to obey the bus: a list that is true if every item is as required.
 
     Args:
@@ -44,7 +44,7 @@ async def check_control(unit: Unit, setpoint: str | None = None, *, unverified: 
 
 @by_name("store", after=0)
 async def prepare_control(
-    unit: Unit, *, store: bool = False, setpoint: str | None = None, unverified: bool = False
+    unit: DriveView, *, store: bool = False, setpoint: str | None = None, unverified: bool = False
 ) -> Control:
     """Sets the drive to obey the bus. Writes only the settings that differ, and returns what `check_control` says then.
 
@@ -97,7 +97,7 @@ async def prepare_control(
     return control
 
 
-async def check_heeded(unit: Unit, setpoint: str, register: str) -> None:
+async def check_heeded(unit: DriveView, setpoint: str, register: str) -> None:
     """Raises `NotAllowed` if the drive would not heed *setpoint*, because it takes that from elsewhere."""
     control = await _check_items(unit, unit.profile.needs(setpoint))
     if not control:
@@ -115,7 +115,7 @@ async def check_heeded(unit: Unit, setpoint: str, register: str) -> None:
         )
 
 
-async def check_set(unit: Unit, wanted: list[Setting], what: str) -> None:
+async def check_set(unit: DriveView, wanted: list[Setting], what: str) -> None:
     """Raises `NotAllowed` if one of *wanted* is surely not as it must be: then the unit does *what* is said.
 
     What no document proves, or may not be read, keeps nobody from starting a motor.
@@ -134,19 +134,19 @@ async def check_set(unit: Unit, wanted: list[Setting], what: str) -> None:
         )
 
 
-def wanted_of_commands(unit: Unit) -> list[Setting]:
+def wanted_of_commands(unit: DriveView) -> list[Setting]:
     """What must be set for commands alone, whatever the setpoints."""
     names = unit.profile.setpoint_names()
     of_setpoints = {row.code for name in names for row in unit.profile.needs(name)}
     return [row for row in unit.profile.control() if row.code not in of_setpoints]
 
 
-def wanted_always(unit: Unit) -> list[Setting]:
+def wanted_always(unit: DriveView) -> list[Setting]:
     """What must be set in any case, or the words of the profile are not where it has them."""
     return [row for row in unit.profile.control() if row.always]
 
 
-def wanted_for(unit: Unit, setpoint: str | None) -> list[Setting]:
+def wanted_for(unit: DriveView, setpoint: str | None) -> list[Setting]:
     """What must be set for *setpoint*, in the order in which to set it."""
     known = unit.profile.setpoint_names()
     if setpoint is not None:
@@ -157,7 +157,7 @@ def wanted_for(unit: Unit, setpoint: str | None) -> list[Setting]:
     return [*(row for row in unit.profile.control() if row.code not in told), *needs]
 
 
-async def _check_items(unit: Unit, wanted: list[Setting]) -> Control:
+async def _check_items(unit: DriveView, wanted: list[Setting]) -> Control:
     codes = unit.evidence.readable(row.code for row in wanted)
     actual = await registers.snapshot(unit, *codes) if codes else {}
     return Control(

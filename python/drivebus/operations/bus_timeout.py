@@ -12,9 +12,9 @@ from drivebus import checks
 from drivebus.errors import BadArgument, DrivebusError, Unconfirmed
 from drivebus.operations import parameters, registers, speed, state
 from drivebus.operations.commands import POLL_INTERVAL
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.last_will import LastWill
 from drivebus.operations.stop_proof import PATIENCE
-from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import not_verified
 from drivebus.values import Value
 
@@ -47,7 +47,7 @@ class BusTimeout:
     unsure: str
     error: DrivebusError | None
 
-    def __init__(self, drive: Unit, timeout: float, action: str) -> None:
+    def __init__(self, drive: DriveView, timeout: float, action: str) -> None:
         settings = drive.profile.watchdog
         if settings is None:
             raise BadArgument(

@@ -23,8 +23,8 @@ from drivebus.errors import (
 from drivebus.identify.harm import HALTS
 from drivebus.look import Look
 from drivebus.operations import raw_words, setpoints, state
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.stop_proof import Fall
-from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource
 
 __all__ = [
@@ -73,7 +73,7 @@ Words: TypeAlias = tuple[int, int | Sequence[int]]
 """An address, and the word or words that go there."""
 
 
-async def prepared(unit: Unit, name: str, setpoint: int | None) -> Words:
+async def prepared(unit: DriveView, name: str, setpoint: int | None) -> Words:
     """Where the command goes, and what goes there: the setpoint behind it, where the drive has both side by side.
 
     Where it has not, the setpoint is sent now.
@@ -87,7 +87,7 @@ async def prepared(unit: Unit, name: str, setpoint: int | None) -> Words:
     return address, code
 
 
-async def send(unit: Unit, name: str, words: Words | None = None) -> None:
+async def send(unit: DriveView, name: str, words: Words | None = None) -> None:
     """Sends a command, once. Where another word says which way the motor turns, that goes out first, once too.
 
     Args:
@@ -115,7 +115,7 @@ async def send(unit: Unit, name: str, words: Words | None = None) -> None:
         raise halted from error
 
 
-async def send_word(unit: Unit, name: str, address: int, payload: int | Sequence[int]) -> None:
+async def send_word(unit: DriveView, name: str, address: int, payload: int | Sequence[int]) -> None:
     """Sends what may move the motor, once. Where nothing is known of it afterwards, that is said."""
     try:
         await raw_words.write(unit, address, payload, judged=name not in _WHATEVER_IT_IS)
@@ -144,7 +144,7 @@ def frames_of(error: DrivebusError) -> dict[str, Any]:
     return {"request": error.request, "raw": error.raw, "started": error.started, "ended": error.ended}
 
 
-async def state_afterwards(unit: Unit, *, urgent: bool = False) -> str:
+async def state_afterwards(unit: DriveView, *, urgent: bool = False) -> str:
     """The state of *unit* after a command of which nothing is known, in words: as it is read now, or was seen last."""
     try:
         return f"State seen afterwards: {await state.glance(unit, urgent=urgent)}"
@@ -153,7 +153,7 @@ async def state_afterwards(unit: Unit, *, urgent: bool = False) -> str:
 
 
 async def confirm(
-    unit: Unit, command: str, shows: Callable[[Look], Awaitable[bool]], within: float, fall: Fall | None = None
+    unit: DriveView, command: str, shows: Callable[[Look], Awaitable[bool]], within: float, fall: Fall | None = None
 ) -> None:
     """Looks until the drive *shows* the command, for *within* seconds, and as long as a *fall* is worth a look."""
     proof = Proof(unit, command, shows, within, fall)
@@ -174,7 +174,7 @@ class Proof:
 
     def __init__(
         self,
-        unit: Unit,
+        unit: DriveView,
         command: str,
         shows: Callable[[Look], Awaitable[bool]],
         within: float,

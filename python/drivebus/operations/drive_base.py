@@ -10,7 +10,7 @@ from drivebus.line.blocking import at_once
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.units import units_of
 from drivebus.operations import registers
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
 from drivebus.values import Description, Value
 
@@ -33,7 +33,7 @@ class DriveFace:
     unit: int
     profile: Profile
 
-    def __init__(self, unit: Unit) -> None:
+    def __init__(self, unit: DriveView) -> None:
         self.unit = unit.address
         self.profile = unit.profile
         self._unit = unit
@@ -77,24 +77,24 @@ class DriveFace:
         return registers.value(self._unit, name, raw)
 
 
-def unit_of(drive: DriveFace) -> Unit:
+def unit_of(drive: DriveFace) -> DriveView:
     """The view of its unit on which a drive's methods work."""
     return drive._unit
 
 
-def views(bus: AwaitableBus) -> list[Unit]:
+def views(bus: AwaitableBus) -> list[DriveView]:
     """The units of *bus* that a drive was asked for: as who started each last sees it, with what trust it ever had."""
     seen = []
     for record in units_of(bus.line).named():
         profile = record.profile
         if profile is not None:
             trusted = profile.name in record.trusted or record.started_unverified
-            seen.append(Unit.create(bus, record.address, profile, None, unverified=trusted, trust_profile=False))
+            seen.append(DriveView.create(bus, record.address, profile, None, unverified=trusted, trust_profile=False))
     return seen
 
 
 def blocking(
-    operation: Callable[Concatenate[Unit, _P], Coroutine[Any, Any, _R]],
+    operation: Callable[Concatenate[DriveView, _P], Coroutine[Any, Any, _R]],
 ) -> Callable[Concatenate[Any, _P], _R]:
     """The method that carries *operation* out at once, with its name, its signature and its docstring."""
 
@@ -106,7 +106,7 @@ def blocking(
 
 
 def awaited(
-    operation: Callable[Concatenate[Unit, _P], Coroutine[Any, Any, _R]],
+    operation: Callable[Concatenate[DriveView, _P], Coroutine[Any, Any, _R]],
 ) -> Callable[Concatenate[Any, _P], Coroutine[None, None, _R]]:
     """The method that awaits *operation*, with its name, its signature and its docstring."""
 

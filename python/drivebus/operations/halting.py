@@ -14,7 +14,7 @@ from drivebus.identify.harm import harmed
 from drivebus.line.frames import may_be_of
 from drivebus.operations import commands, raw_words, state
 from drivebus.operations.aim import ANSWER_WITHIN, Aim, Target
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 
 __all__ = ["WITHIN", "Halt"]
 
@@ -46,7 +46,7 @@ class Halt:
         is_confirmed: Whether it confirmed that; a unit may also say that it is still at it, and show nothing.
     """
 
-    def __init__(self, unit: Unit, rota: Sequence[str], within: float) -> None:
+    def __init__(self, unit: DriveView, rota: Sequence[str], within: float) -> None:
         self.unit = unit
         self.command = rota[0]
         self.sent = self.confirmed = unit.bus.now()

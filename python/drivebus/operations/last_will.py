@@ -13,8 +13,8 @@ from drivebus.identify import codes
 from drivebus.identify.contradiction import contradiction
 from drivebus.identify.refusals import Answer
 from drivebus.line.protocols import KeepsWills
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.raw_words import as_written
-from drivebus.operations.unit import Unit
 from drivebus.profile import Profile
 
 __all__ = ["LastWill"]
@@ -37,7 +37,7 @@ class LastWill:
         first: What is tried first, `"stop"` or `"coast"`.
     """
 
-    def __init__(self, unit: Unit, silence: float = 0.0, first: str = "stop") -> None:
+    def __init__(self, unit: DriveView, silence: float = 0.0, first: str = "stop") -> None:
         self._unit = unit
         self._silence = silence
         self._ways = sorted(_WAYS, key=lambda way: way != first)

@@ -14,10 +14,10 @@ from drivebus.look import Look
 from drivebus.operations import bus_control, commands, setpoints, speed, start_checks, start_sequence, state
 from drivebus.operations.aim import check_harmless
 from drivebus.operations.by_name import by_name
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.halting import WITHIN, Halt
 from drivebus.operations.program_end import before_start
 from drivebus.operations.stop_proof import Fall
-from drivebus.operations.unit import Unit
 from drivebus.values import ControlSource, State
 
 __all__ = [
@@ -37,7 +37,7 @@ __all__ = [
 
 @by_name("reverse", after=1)
 async def run(
-    unit: Unit,
+    unit: DriveView,
     hz: float | None = None,
     *,
     reverse: bool = False,
@@ -91,7 +91,7 @@ async def run(
 
 @by_name("reverse", after=0)
 async def jog(
-    unit: Unit, *, reverse: bool = False, confirm: float = 1.0, force: bool = False, unverified: bool = False
+    unit: DriveView, *, reverse: bool = False, confirm: float = 1.0, force: bool = False, unverified: bool = False
 ) -> None:
     """Jogs the motor at the drive's jog frequency, until `jog_stop`. Checks and errors are those of `run`.
 
@@ -109,7 +109,7 @@ async def jog(
     await _start(unit, command, None, reverse, before, confirm)
 
 
-async def stop(unit: Unit, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
+async def stop(unit: DriveView, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
     """Stops the motor as the drive is set to stop it, usually by a ramp. Sent at once, whatever the state is.
 
     Returns after half a second and a hertz of the drive's own ramp, where the motor ran at its setpoint and only
@@ -142,7 +142,7 @@ async def stop(unit: Unit, *, confirm: float = 1.0, within: float = WITHIN, unve
     await _halt(unit.trusting(unverified), "stop", confirm, within)
 
 
-async def coast(unit: Unit, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
+async def coast(unit: DriveView, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
     """Switches the output off: the motor turns on until friction stops it. Arguments and errors as for `stop`.
 
     Returns when the drive is stopped: what coasts has no ramp.
@@ -150,7 +150,7 @@ async def coast(unit: Unit, *, confirm: float = 1.0, within: float = WITHIN, unv
     await _halt(unit.trusting(unverified), "coast", confirm, within)
 
 
-async def jog_stop(unit: Unit, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
+async def jog_stop(unit: DriveView, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
     """Ends a jog by the jog's own ramp. As `stop`; where there is no such command, the error says what ends it."""
     unit = unit.trusting(unverified)
     if "jog_stop" not in unit.profile.commands():
@@ -168,22 +168,22 @@ async def jog_stop(unit: Unit, *, confirm: float = 1.0, within: float = WITHIN, 
     await _halt(unit, "jog_stop", confirm, within)
 
 
-async def end_run(unit: Unit, within: float = WITHIN, *, confirm: float = 1.0) -> None:
+async def end_run(unit: DriveView, within: float = WITHIN, *, confirm: float = 1.0) -> None:
     """Stops a motor by all means: by a stop, and where that is not taken now and then by a coast. As `stop`."""
     await _halt(unit, "stop", confirm, within, coasts=True)
 
 
-async def end_jog(unit: Unit, within: float = WITHIN) -> None:
+async def end_jog(unit: DriveView, within: float = WITHIN) -> None:
     """Ends a jog by all means, by its jog stop or else by a stop. Errors as for `stop`."""
     await _halt(unit, "jog_stop" if has_jog_stop(unit) else "stop", 1.0, within, coasts=True)
 
 
-def has_jog_stop(unit: Unit) -> bool:
+def has_jog_stop(unit: DriveView) -> bool:
     """Whether the family has a command that ends a jog alone, and it may be given."""
     return halting(unit, "jog_stop").evidence.unusable("jog_stop") is None
 
 
-async def reset_fault(unit: Unit, *, confirm: float = 1.0, unverified: bool = False) -> None:
+async def reset_fault(unit: DriveView, *, confirm: float = 1.0, unverified: bool = False) -> None:
     """Resets a fault after its cause is gone. Sends nothing if there is no fault.
 
     Raises:
@@ -211,7 +211,9 @@ async def reset_fault(unit: Unit, *, confirm: float = 1.0, unverified: bool = Fa
     await commands.confirm(unit, "reset_fault", shows, confirm)
 
 
-async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, before: Look, confirm: float) -> None:
+async def _start(
+    unit: DriveView, command: str, setpoint: int | None, reverse: bool, before: Look, confirm: float
+) -> None:
     wanted = State.REVERSE if reverse else State.FORWARD
     turning_round = before.state.running and before.state is not wanted
     frequency = await speed.output_frequency(unit) if turning_round else None
@@ -239,7 +241,7 @@ async def _start(unit: Unit, command: str, setpoint: int | None, reverse: bool, 
     await commands.confirm(unit, command, shows, confirm)
 
 
-async def _halt(unit: Unit, command: str, confirm: float, within: float, *, coasts: bool = False) -> None:
+async def _halt(unit: DriveView, command: str, confirm: float, within: float, *, coasts: bool = False) -> None:
     confirm = checks.number("confirm", confirm, 0.0, 3600.0)
     within = checks.number("within", within, 0.0, 3600.0)
     unit = halting(unit, command)
@@ -276,7 +278,7 @@ async def prove(halt: Halt, within: float) -> commands.Proof:
     return _proof_of_halt(halt.unit, halt.command, halt.sent, halt.confirmed, within)
 
 
-def _proof_of_halt(unit: Unit, command: str, sent: float, confirmed: float, within: float) -> commands.Proof:
+def _proof_of_halt(unit: DriveView, command: str, sent: float, confirmed: float, within: float) -> commands.Proof:
     """The looks that prove a *command* that halts, *sent* and *confirmed* at these times of the line's clock.
 
     Where the family has no state that may be used, the confirmation is all there is: nothing is left to be proved.
@@ -313,11 +315,11 @@ def _proof_of_halt(unit: Unit, command: str, sent: float, confirmed: float, with
     return commands.Proof(unit, command, shows, within if told else 0.0, fall)
 
 
-def _turns_as_started(unit: Unit, seen: State) -> bool:
+def _turns_as_started(unit: DriveView, seen: State) -> bool:
     """Whether it turns as it was started here last, if it was: not the other way still, nor maybe in a jog."""
     return unit.record.started_as in (None, seen)
 
 
-def halting(unit: Unit, command: str) -> Unit:
+def halting(unit: DriveView, command: str) -> DriveView:
     """The same unit; where a start was forced on what is not verified, as *command* is, with the same trust."""
     return unit.trusting(unit.record.started_unverified and unit.evidence.unusable(command) is not None)

@@ -10,10 +10,10 @@ from drivebus.errors import DrivebusError, Unconfirmed
 from drivebus.line.blocking import at_once
 from drivebus.line.protocols import AwaitableBus
 from drivebus.operations import motion, waiting
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.last_will import LastWill
 from drivebus.operations.program_end import Guard
-from drivebus.operations.unit import Unit
 
 __all__ = ["MotorBlock"]
 
@@ -44,9 +44,9 @@ class MotorBlock:
 
     def __init__(
         self,
-        unit: Unit,
+        unit: DriveView,
         start: Callable[[], Awaitable[None]],
-        end: Callable[[Unit, float], Awaitable[None]],
+        end: Callable[[DriveView, float], Awaitable[None]],
         standstill: float | None = None,
         within: float = WITHIN,
     ) -> None:
@@ -160,7 +160,7 @@ class MotorBlock:
             failure, interrupted = at_once(self._end_by_all_means(self._elsewhere))
         return failure or interrupted
 
-    async def _end_by_all_means(self, unit: Unit) -> _Outcome:
+    async def _end_by_all_means(self, unit: DriveView) -> _Outcome:
         """Ends it, or coasts where that fails. Returns what is left to raise: a failure, and what interrupted it."""
         interrupted: BaseException | None = None
         failure: DrivebusError | None = None

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from drivebus.advice import Advice, Text
 from drivebus.errors import LINE_ERRORS, Refused, StoreWarning, level_of_the_program
 from drivebus.operations import raw_words, registers
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.values import Description
 
 __all__ = ["Planned", "is_in_ram", "key", "put_in_ram", "stored", "write"]
@@ -30,7 +30,7 @@ class Planned(NamedTuple):
     raw: int
 
 
-async def write(unit: Unit, run: Sequence[Planned], store: bool) -> None:
+async def write(unit: DriveView, run: Sequence[Planned], store: bool) -> None:
     """Sends the writes of *run*, whose addresses follow each other, by one request.
 
     What EEPROM has already is left out, and the rest goes by as few requests as it takes.
@@ -55,7 +55,7 @@ async def write(unit: Unit, run: Sequence[Planned], store: bool) -> None:
     await _store(unit, left, is_told)
 
 
-async def _store(unit: Unit, run: Sequence[Planned], is_told: bool) -> None:
+async def _store(unit: DriveView, run: Sequence[Planned], is_told: bool) -> None:
     """Writes *run* to EEPROM; whether reading would tell that EEPROM took it *is told*."""
     if not run:
         return
@@ -65,7 +65,7 @@ async def _store(unit: Unit, run: Sequence[Planned], is_told: bool) -> None:
         stored(unit, item.known)
 
 
-async def _send(unit: Unit, run: Sequence[Planned], read_back: int | None) -> None:
+async def _send(unit: DriveView, run: Sequence[Planned], read_back: int | None) -> None:
     if len(run) == 1:
         await raw_words.write(unit, run[0].address, run[0].raw, read_back=read_back, absolute=True)
         return
@@ -78,7 +78,7 @@ async def _send(unit: Unit, run: Sequence[Planned], read_back: int | None) -> No
         raise
 
 
-async def _shown(unit: Unit, run: Sequence[Planned]) -> str:
+async def _shown(unit: DriveView, run: Sequence[Planned]) -> str:
     """What the drive shows of *run*, for people."""
     together = f"{', '.join(item.name for item in run)} shared that request"
     try:
@@ -92,17 +92,17 @@ async def _shown(unit: Unit, run: Sequence[Planned]) -> str:
     return f"{together}. In force in the drive now: {', '.join(values)}"
 
 
-def is_in_ram(unit: Unit, name: str) -> bool:
+def is_in_ram(unit: DriveView, name: str) -> bool:
     """Whether this program wrote *name* to RAM, and not to EEPROM since: what it reads as is then not stored."""
     return key(unit.profile.describe(name)) in unit.record.in_ram
 
 
-def put_in_ram(unit: Unit, known: Description) -> None:
+def put_in_ram(unit: DriveView, known: Description) -> None:
     """Says that a parameter is about to be written to RAM: the drive may take it although its answer is lost."""
     unit.record.in_ram.add(key(known))
 
 
-def stored(unit: Unit, known: Description) -> None:
+def stored(unit: DriveView, known: Description) -> None:
     """Says that a parameter was written to EEPROM, and warns of a program that does that in a loop."""
     name = key(known)
     unit.record.in_ram.discard(name)

@@ -14,8 +14,8 @@ from drivebus import checks
 from drivebus.advice import Advice, Text, argument, call, joined
 from drivebus.errors import BadArgument, DrivebusError, NotReady
 from drivebus.operations import parameter_writes, registers, state, unit_variants
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.parameter_writes import Planned, key
-from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence
 from drivebus.values import Description, Value
 
@@ -30,11 +30,15 @@ class _Limit(NamedTuple):
 
 
 @overload
-async def write(unit: Unit, name: str, value: object, *, store: bool = False, unverified: bool = False) -> None: ...
-@overload
-async def write(unit: Unit, name: Mapping[str, object], *, store: bool = False, unverified: bool = False) -> None: ...
 async def write(
-    unit: Unit,
+    unit: DriveView, name: str, value: object, *, store: bool = False, unverified: bool = False
+) -> None: ...
+@overload
+async def write(
+    unit: DriveView, name: Mapping[str, object], *, store: bool = False, unverified: bool = False
+) -> None: ...
+async def write(
+    unit: DriveView,
     name: str | Mapping[str, object],
     value: object = None,
     *,
@@ -100,7 +104,7 @@ async def write(
         done += [item.name for item in run]
 
 
-def _runs(unit: Unit, planned: Sequence[Planned]) -> Iterator[list[Planned]]:
+def _runs(unit: DriveView, planned: Sequence[Planned]) -> Iterator[list[Planned]]:
     """The writes in their order; those that may share a request stand together."""
     run: list[Planned] = []
     for item in planned:
@@ -112,7 +116,7 @@ def _runs(unit: Unit, planned: Sequence[Planned]) -> Iterator[list[Planned]]:
         yield run
 
 
-def _may_follow(unit: Unit, run: Sequence[Planned], item: Planned) -> bool:
+def _may_follow(unit: DriveView, run: Sequence[Planned], item: Planned) -> bool:
     """Whether *item* may be written by the request that writes *run*.
 
     What narrows another one's range does not share its request: in which order a drive checks the words is not printed.
@@ -131,7 +135,7 @@ def _may_follow(unit: Unit, run: Sequence[Planned], item: Planned) -> bool:
     return not narrows and not narrowed
 
 
-def _is_plain(unit: Unit, item: Planned) -> bool:
+def _is_plain(unit: DriveView, item: Planned) -> bool:
     """Whether *item* is a parameter that is simply kept, while the drive runs too."""
     return (
         item.known.kind == "parameter" and item.known.access == "run" and unit.profile.read_back(item.name) is not None
@@ -145,7 +149,7 @@ def _alone(evidence: Evidence) -> frozenset[str]:
     return frozenset(key(profile.describe(name)) for name in names)
 
 
-def _check_deciding(unit: Unit, wanted: Mapping[str, object]) -> None:
+def _check_deciding(unit: DriveView, wanted: Mapping[str, object]) -> None:
     """Raises `NotAllowed` if one of *wanted* changes what another one means, or what this drive was said to be."""
     for variant, rule in unit_variants.rules(unit).items():
         parameter = key(unit.profile.describe(rule.parameter))
@@ -171,7 +175,7 @@ def _check_deciding(unit: Unit, wanted: Mapping[str, object]) -> None:
             )
 
 
-def plan_write(unit: Unit, name: str, value: object, store: bool) -> Planned:
+def plan_write(unit: DriveView, name: str, value: object, store: bool) -> Planned:
     """The write of *value* to *name*. Raises `NotAllowed` where the profile does not allow it."""
     known = unit.profile.describe(name)
     if not known.writable:
@@ -207,7 +211,7 @@ def plan_write(unit: Unit, name: str, value: object, store: bool) -> Planned:
     return Planned(known, name, address, raw)
 
 
-async def check_now(unit: Unit, planned: Sequence[Planned]) -> None:
+async def check_now(unit: DriveView, planned: Sequence[Planned]) -> None:
     """Checks what only the drive knows: whether it is stopped, and ranges that its parameters narrow."""
     only_stopped = [item.name for item in planned if item.known.access == "stop"]
     # Where no state is known the drive has to refuse by itself.
@@ -234,7 +238,7 @@ async def check_now(unit: Unit, planned: Sequence[Planned]) -> None:
         in_force[key(item.known)] = registers.value(unit, item.name, item.raw)
 
 
-def _check_range(unit: Unit, item: Planned, in_force: Mapping[str, Value]) -> None:
+def _check_range(unit: DriveView, item: Planned, in_force: Mapping[str, Value]) -> None:
     value = registers.value(unit, item.name, item.raw)
     for other, low in _limits(unit, item.known):
         narrow = unit.profile.describe(other)
@@ -249,7 +253,7 @@ def _check_range(unit: Unit, item: Planned, in_force: Mapping[str, Value]) -> No
         )
 
 
-def _limits(unit: Unit, known: Description) -> list[_Limit]:
+def _limits(unit: DriveView, known: Description) -> list[_Limit]:
     """The parameters that narrow the range of *known*, by its own row or by theirs."""
     named = ((known.low_from, True), (known.high_from, False))
     limits = [_Limit(other, low) for other, low in named if other is not None]

@@ -11,7 +11,7 @@ from drivebus.line.asking import Read, Write
 from drivebus.line.write_guard import check_words
 from drivebus.operations.aim import check_harmless
 from drivebus.operations.by_name import by_name
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
 from drivebus.values import State
 
@@ -30,7 +30,7 @@ _UNKNOWN, _NOWHERE = "unknown", "not_in_the_specification"
 
 
 async def read_words(
-    unit: Unit, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
+    unit: DriveView, address: int, count: int = 1, *, urgent: bool = False, verify: bool = False
 ) -> list[int]:
     """Reads words by address or place, as they are. As `Bus.read`, but a refusal says what this family means by it."""
     with explained(unit):
@@ -38,7 +38,7 @@ async def read_words(
 
 
 @by_name("force", after=2)
-async def write_words(unit: Unit, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
+async def write_words(unit: DriveView, address: int, value: int | Sequence[int], *, force: bool = False) -> None:
     """Writes one word (an int: 06H, or 10H where there is no 06H) or several (a sequence: 10H), as they are. Sent once.
 
     As `Bus.write`, but another drive that answers at this address gets nothing, and a refusal says what this family
@@ -64,7 +64,7 @@ async def write_words(unit: Unit, address: int, value: int | Sequence[int], *, f
 
 
 async def write(
-    unit: Unit,
+    unit: DriveView,
     address: int,
     value: int | Sequence[int],
     *,
@@ -97,7 +97,7 @@ async def write(
         return
 
 
-async def _made_sure(unit: Unit, address: int, judged: bool) -> int:
+async def _made_sure(unit: DriveView, address: int, judged: bool) -> int:
     """The connection over which the unit is what it was, and, where that is *judged*, takes no harm at *address*."""
     connection = await unit.identity.check(unit.bus, judged=judged)
     if judged:
@@ -112,7 +112,7 @@ def as_written(profile: Profile, value: int | Sequence[int]) -> int | Sequence[i
 
 
 async def send(
-    unit: Unit,
+    unit: DriveView,
     address: int,
     value: int | Sequence[int],
     *,
@@ -144,7 +144,7 @@ async def send(
 
 
 @contextmanager
-def explained(unit: Unit) -> Iterator[None]:
+def explained(unit: DriveView) -> Iterator[None]:
     """A block in which a refusal says what this family means by its code, and what it was that was refused."""
     try:
         yield
@@ -168,7 +168,7 @@ def explained(unit: Unit) -> Iterator[None]:
         ) from None
 
 
-def _about_password(unit: Unit, exception: str) -> str:
+def _about_password(unit: DriveView, exception: str) -> str:
     """What to do about a drive that is locked."""
     if exception not in _LOCKED:
         return ""

@@ -9,7 +9,7 @@ from drivebus.advice import Text
 from drivebus.errors import BadArgument
 from drivebus.line.asking import Read
 from drivebus.operations import raw_words, unit_variants
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.plan import labelled
@@ -18,18 +18,20 @@ from drivebus.values import Snapshot, Value
 __all__ = ["contradiction", "monitor", "read", "readable", "settled_profile", "snapshot", "value"]
 
 
-def value(unit: Unit, name: str, raw: int) -> Value:
+def value(unit: DriveView, name: str, raw: int) -> Value:
     """The word *raw* of *name* in engineering units."""
     return labelled(unit.profile.describe(name), unit.profile.decode(name, raw))
 
 
 @overload
-async def read(unit: Unit, name: str, /, *, verify: bool = False, unverified: bool = False) -> Value: ...
+async def read(unit: DriveView, name: str, /, *, verify: bool = False, unverified: bool = False) -> Value: ...
 @overload
 async def read(
-    unit: Unit, first: str, second: str, /, *more: str, verify: bool = False, unverified: bool = False
+    unit: DriveView, first: str, second: str, /, *more: str, verify: bool = False, unverified: bool = False
 ) -> dict[str, Value]: ...
-async def read(unit: Unit, *names: str, verify: bool = False, unverified: bool = False) -> Value | dict[str, Value]:
+async def read(
+    unit: DriveView, *names: str, verify: bool = False, unverified: bool = False
+) -> Value | dict[str, Value]:
     """Reads registers or parameters in the fewest requests.
 
     One name gives its value, several give a dict in the order asked. Values are floats in engineering units, ints
@@ -50,7 +52,7 @@ async def read(unit: Unit, *names: str, verify: bool = False, unverified: bool =
     return values[names[0]] if len(names) == 1 else dict(values)
 
 
-async def snapshot(unit: Unit, *names: str, verify: bool = False, unverified: bool = False) -> Snapshot:
+async def snapshot(unit: DriveView, *names: str, verify: bool = False, unverified: bool = False) -> Snapshot:
     """Reads *names* in the fewest requests, under one time stamp. *verify* and *unverified* as for `read`."""
     unit = unit.trusting(unverified)
     unit.evidence.require_readable(names)
@@ -67,7 +69,7 @@ async def snapshot(unit: Unit, *names: str, verify: bool = False, unverified: bo
     return Snapshot(values, plan.units, started, ended - started)
 
 
-async def monitor(unit: Unit, *names: str, unverified: bool = False) -> Snapshot:
+async def monitor(unit: DriveView, *names: str, unverified: bool = False) -> Snapshot:
     """Reads *names*, or all monitor registers of the family, in the fewest requests, under one time stamp.
 
     The result is a mapping whose names are attributes too: `drive.monitor().output_current`; its `units` say in
@@ -81,7 +83,7 @@ async def monitor(unit: Unit, *names: str, unverified: bool = False) -> Snapshot
     return await snapshot(unit, *(names or readable(unit)))
 
 
-def readable(unit: Unit, *names: str) -> list[str]:
+def readable(unit: DriveView, *names: str) -> list[str]:
     """See `Drive.readable`."""
     if not names:
         # The same each time, and looked up for every sample of a monitor.
@@ -101,7 +103,7 @@ def readable(unit: Unit, *names: str) -> list[str]:
     return list(names)
 
 
-async def settled_profile(unit: Unit, *names: str, unverified: bool = False) -> Profile:
+async def settled_profile(unit: DriveView, *names: str, unverified: bool = False) -> Profile:
     """What the words of *names* mean as this drive is set, where one of its parameters decides their unit or scale.
 
     The drive is asked for that parameter; where none decides, nothing is sent. Afterwards somebody may set it anew.
@@ -117,7 +119,7 @@ async def settled_profile(unit: Unit, *names: str, unverified: bool = False) -> 
     return (await unit_variants.settled(unit.trusting(unverified), *names)).profile
 
 
-async def contradiction(unit: Unit) -> str | None:
+async def contradiction(unit: DriveView) -> str | None:
     """How the unit's own answer contradicts its profile, and what to do; None if it does not.
 
     Reads, as the first write does. For a *trust_profile* too.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from drivebus import checks
 from drivebus.errors import BadArgument
 from drivebus.operations import bus_control, parameter_writes, parameters, raw_words, registers, unit_variants
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
 from drivebus.values import Value
 
@@ -73,7 +73,7 @@ class SetpointRange:
         return hz
 
 
-async def read_setpoint(unit: Unit, name: str = "frequency", *, unverified: bool = False) -> float:
+async def read_setpoint(unit: DriveView, name: str = "frequency", *, unverified: bool = False) -> float:
     """Reads the setpoint last given over the bus: the frequency in Hz, or another in the unit of its register.
 
     Args:
@@ -90,7 +90,7 @@ async def read_setpoint(unit: Unit, name: str = "frequency", *, unverified: bool
     return float(await registers.read(unit, register))
 
 
-async def check_setpoints(unit: Unit, low: float, high: float, *, unverified: bool = False) -> SetpointRange:
+async def check_setpoints(unit: DriveView, low: float, high: float, *, unverified: bool = False) -> SetpointRange:
     """Asks the drive once whether it takes frequency setpoints from *low* to *high*. None is sent.
 
         allowed = drive.check_setpoints(10.0, 30.0)
@@ -116,7 +116,7 @@ async def check_setpoints(unit: Unit, low: float, high: float, *, unverified: bo
 
 
 async def write_setpoint(
-    unit: Unit,
+    unit: DriveView,
     value: float,
     name: str = "frequency",
     *,
@@ -159,7 +159,7 @@ async def write_setpoint(
     await parameter_writes.write(unit, [planned], False)
 
 
-def _as_checked(unit: Unit, name: str, checked: SetpointRange) -> Unit:
+def _as_checked(unit: DriveView, name: str, checked: SetpointRange) -> DriveView:
     """The same unit, as it was set when its setpoints were *checked*. Raises `NotAllowed` where another was."""
     if not isinstance(checked, SetpointRange):
         raise BadArgument(
@@ -176,12 +176,12 @@ def _as_checked(unit: Unit, name: str, checked: SetpointRange) -> Unit:
     return unit.with_profile(checked.profile)
 
 
-async def with_setpoint(unit: Unit, setpoint: str) -> Unit:
+async def with_setpoint(unit: DriveView, setpoint: str) -> DriveView:
     """The same unit, with everything fixed on which the meaning of *setpoint* depends."""
     return await unit_variants.settled(unit, register_of(unit, setpoint))
 
 
-def register_of(unit: Unit, setpoint: str) -> str:
+def register_of(unit: DriveView, setpoint: str) -> str:
     """The register of *setpoint*. Raises `NotAllowed` where the family has none that is known."""
     if not isinstance(setpoint, str):
         raise BadArgument(
@@ -199,7 +199,7 @@ def register_of(unit: Unit, setpoint: str) -> str:
     return register
 
 
-def _frequency_in_hz(unit: Unit) -> str:
+def _frequency_in_hz(unit: DriveView) -> str:
     """The frequency register, if it is in Hz: some families have it in percent or rpm, as they are set."""
     register = register_of(unit, "frequency")
     counted_in = unit.profile.describe(register).unit
@@ -212,14 +212,14 @@ def _frequency_in_hz(unit: Unit) -> str:
     return register
 
 
-async def write_word(unit: Unit, word: int) -> None:
+async def write_word(unit: DriveView, word: int) -> None:
     """Writes the frequency, as the drive counts it."""
     register = register_of(unit, "frequency")
     read_back = unit.profile.read_back(register)
     await raw_words.write(unit, unit.profile.address(register), word, read_back=read_back, absolute=True)
 
 
-async def word_of(unit: Unit, hz: float) -> int:
+async def word_of(unit: DriveView, hz: float) -> int:
     """*hz* as the drive counts it, if that is no more than its own maximum."""
     raw = _counted(unit, hz)
     register = register_of(unit, "frequency")
@@ -235,7 +235,7 @@ async def word_of(unit: Unit, hz: float) -> int:
     return raw
 
 
-def _counted(unit: Unit, hz: float) -> int:
+def _counted(unit: DriveView, hz: float) -> int:
     """*hz* as the drive counts it, as far as the profile tells whether it may be sent."""
     hz = checks.number("setpoint", hz, 0.0)
     register = _frequency_in_hz(unit)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from drivebus.errors import BadAnswer, NoAnswer, Refused
 from drivebus.look import STANDSTILL
 from drivebus.operations import bus_control, raw_words, registers
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.values import State, Value
 
 __all__ = ["Ramp", "frequencies", "output_frequency", "ramp", "turns_in_spite_of"]
@@ -22,7 +22,7 @@ class Ramp(NamedTuple):
     only_by_bus: bool
 
 
-async def frequencies(unit: Unit, *, urgent: bool) -> tuple[float | None, float]:
+async def frequencies(unit: DriveView, *, urgent: bool) -> tuple[float | None, float]:
     """Output frequency and setpoint in force, in Hz, in one read; what the family does not tell is None, or inf."""
     names = {role: unit.profile.role(role) for role in ("frequency", "setpoint")}
     known = {role: name for role, name in names.items() if name and unit.evidence.unreadable(name) is None}
@@ -35,7 +35,7 @@ async def frequencies(unit: Unit, *, urgent: bool) -> tuple[float | None, float]
     return told["frequency"], told.get("setpoint", math.inf)
 
 
-async def ramp(unit: Unit, *, urgent: bool) -> Ramp:
+async def ramp(unit: DriveView, *, urgent: bool) -> Ramp:
     """How a stop slows the motor down, and who else may, as the drive's parameters say it."""
     time, start = unit.profile.role("deceleration"), unit.profile.role("ramp_start")
     wanted = bus_control.wanted_for(unit, None)
@@ -50,7 +50,7 @@ async def ramp(unit: Unit, *, urgent: bool) -> Ramp:
     return Ramp(hz / seconds if hz > 0 and seconds > 0 else None, only_by_bus)
 
 
-async def output_frequency(unit: Unit, *, urgent: bool = False) -> float | None:
+async def output_frequency(unit: DriveView, *, urgent: bool = False) -> float | None:
     """The output frequency in Hz, whichever way the motor turns; None where the family does not tell."""
     register = unit.profile.role("frequency")
     if register is None or unit.evidence.unreadable(register) is not None:
@@ -59,7 +59,7 @@ async def output_frequency(unit: Unit, *, urgent: bool = False) -> float | None:
     return abs(float(registers.value(unit, register, word)))
 
 
-async def turns_in_spite_of(unit: Unit, state: State, *, urgent: bool) -> bool:
+async def turns_in_spite_of(unit: DriveView, state: State, *, urgent: bool) -> bool:
     """Whether a motor whose *state* says that it rests still turns, in a family whose word may say so on the ramp."""
     if not state.at_rest or not unit.profile.rest_by_frequency():
         return False
@@ -67,7 +67,7 @@ async def turns_in_spite_of(unit: Unit, state: State, *, urgent: bool) -> bool:
     return frequency is not None and frequency > STANDSTILL
 
 
-async def _told(unit: Unit, names: Sequence[str], *, urgent: bool) -> dict[str, Value]:
+async def _told(unit: DriveView, names: Sequence[str], *, urgent: bool) -> dict[str, Value]:
     """What the drive says of *names*, in the fewest requests."""
     if not names:
         return {}

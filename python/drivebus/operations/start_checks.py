@@ -11,7 +11,7 @@ from drivebus.advice import Advice, Text, argument, call
 from drivebus.errors import BadAnswer, BadLink, NoAnswer, NotReady, Refused
 from drivebus.look import Look
 from drivebus.operations import bus_control, start_sequence, state
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.profile.evidence import Evidence
 from drivebus.values import ControlSource, State
 
@@ -25,14 +25,14 @@ _LOOKS_TO_PROVE = 10
 """Looks at the state that prove a link in doubt: as many as `Link` counts, so that the old ones count no more."""
 
 
-def may_be_given(unit: Unit, command: str) -> None:
+def may_be_given(unit: DriveView, command: str) -> None:
     """Raises `NotAllowed` where *command* may not be given, or what it starts could not be stopped again."""
     unit.evidence.require_command(command)
     start_sequence.check_seen(unit)
     can_be_stopped(unit)
 
 
-def can_be_stopped(unit: Unit) -> None:
+def can_be_stopped(unit: DriveView) -> None:
     """Raises `NotAllowed` where a motor that turns could not be stopped over the bus."""
     reasons = {halt: unit.evidence.unusable(halt) for halt in ("stop", "coast")}
     if all(reasons.values()):
@@ -41,7 +41,7 @@ def can_be_stopped(unit: Unit) -> None:
         raise unit.evidence.missing(what, told, _both_unusable)
 
 
-async def prove_link(unit: Unit, force: bool) -> None:
+async def prove_link(unit: DriveView, force: bool) -> None:
     """No motor starts on a link that may not carry its stop. Sends nothing where the last exchanges went well."""
     link = await unit.bus.link(unit.address)
     if force or link.failed <= _FAILURES_ALLOWED:
@@ -69,7 +69,7 @@ async def prove_link(unit: Unit, force: bool) -> None:
         )
 
 
-async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Look:
+async def ready_to_start(unit: DriveView, *, by_bus: bool = True) -> Look:
     """How the drive stands. Raises `NotAllowed` where it would not start, or not obey the bus (*by_bus*)."""
     await bus_control.check_set(unit, bus_control.wanted_always(unit), "has its words elsewhere")
     seen = await state.glance(unit)
@@ -106,7 +106,7 @@ async def ready_to_start(unit: Unit, *, by_bus: bool = True) -> Look:
     return seen
 
 
-def check_at_rest(unit: Unit, seen: Look) -> None:
+def check_at_rest(unit: DriveView, seen: Look) -> None:
     """Raises `NotAllowed` where the motor turns already: a jog could not be told from what it does."""
     if seen.state.running:
         raise NotReady(

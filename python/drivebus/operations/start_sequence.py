@@ -10,7 +10,7 @@ from drivebus.advice import Text, call
 from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotReady, PortError, Refused, Unconfirmed
 from drivebus.look import Look
 from drivebus.operations import commands, raw_words, state
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.facts import StartStep
 
@@ -19,7 +19,7 @@ __all__ = ["check_seen", "lead_up"]
 _ADVICE = "See what holds it back (its terminals, its mains, its keypad, who else commands it), then start it again"
 
 
-def check_seen(unit: Unit) -> None:
+def check_seen(unit: DriveView) -> None:
     """Raises `NotAllowed` where *unit* wants words before a run and its state between them may not be read."""
     if unit.profile.start_sequence():
         reason = unit.evidence.without_state()
@@ -28,7 +28,7 @@ def check_seen(unit: Unit) -> None:
             raise unit.evidence.missing(what, reason, Evidence.without_state)
 
 
-async def lead_up(unit: Unit, command: str, within: float) -> None:
+async def lead_up(unit: DriveView, command: str, within: float) -> None:
     """Sends what the family wants before *command*; nothing where it wants nothing.
 
     The state is looked at once after each word in any case, and again for *within* seconds.
@@ -56,7 +56,7 @@ class _Step:
         is_first: Whether nothing was sent before it.
     """
 
-    def __init__(self, unit: Unit, command: str, step: StartStep, halts_before: int, *, is_first: bool) -> None:
+    def __init__(self, unit: DriveView, command: str, step: StartStep, halts_before: int, *, is_first: bool) -> None:
         self._unit, self._command, self._step = unit, command, step
         self._halts_before, self._is_first = halts_before, is_first
         self._called = f"{step['label']} ({step['word']:04X}H)"

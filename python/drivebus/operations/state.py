@@ -14,7 +14,7 @@ from drivebus.errors import BadArgument
 from drivebus.line.asking import Read
 from drivebus.look import Look
 from drivebus.operations import raw_words, registers
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.plan import ReadPlan
 from drivebus.values import Fault, State, Status
@@ -45,7 +45,7 @@ class _Plan(NamedTuple):
     missing: Mapping[str, str]
 
 
-async def look(unit: Unit, *, urgent: bool = False, unverified: bool = False) -> Look:
+async def look(unit: DriveView, *, urgent: bool = False, unverified: bool = False) -> Look:
     """Reads the drive's status words, in one read where they stand side by side.
 
     Raises:
@@ -59,7 +59,7 @@ async def look(unit: Unit, *, urgent: bool = False, unverified: bool = False) ->
     return seen
 
 
-async def glance(unit: Unit, *, urgent: bool = False) -> Look:
+async def glance(unit: DriveView, *, urgent: bool = False) -> Look:
     """As `look`; where nothing may be read, nothing is, and nothing is told."""
     plan = planned(unit)
     if plan.plan is None:
@@ -93,7 +93,7 @@ async def glance(unit: Unit, *, urgent: bool = False) -> Look:
     return seen
 
 
-async def state(unit: Unit, *, unverified: bool = False) -> State:
+async def state(unit: DriveView, *, unverified: bool = False) -> State:
     """What the drive is doing: one read of its state word.
 
     Raises:
@@ -106,7 +106,7 @@ async def state(unit: Unit, *, unverified: bool = False) -> State:
     return seen
 
 
-async def ping(unit: Unit) -> None:
+async def ping(unit: DriveView) -> None:
     """Checks that the unit answers, by one read: of its state word, if the family has one.
 
     Raises:
@@ -123,7 +123,7 @@ async def ping(unit: Unit) -> None:
     raise BadArgument(f"nothing is known that {unit.profile.title} answers, so unit {unit.address} was not asked")
 
 
-def planned(unit: Unit) -> _Plan:
+def planned(unit: DriveView) -> _Plan:
     """What a look at the unit reads."""
     return unit.evidence.cached(_plan)
 
@@ -144,7 +144,7 @@ def _plan(evidence: Evidence) -> _Plan:
     return _Plan(plan, state, [*in_status, *others], fault, missing)
 
 
-async def status(unit: Unit, *, unverified: bool = False) -> Status:
+async def status(unit: DriveView, *, unverified: bool = False) -> Status:
     """State, readiness, control source, frequency and fault, in two reads if the family has them side by side.
 
     What the family does not tell, or what is not verified, is None (the state: `State.UNKNOWN`), and `missing` has
@@ -157,7 +157,7 @@ async def status(unit: Unit, *, unverified: bool = False) -> Status:
     return await _status(unit, await glance(unit))
 
 
-async def _status(unit: Unit, seen: Look) -> Status:
+async def _status(unit: DriveView, seen: Look) -> Status:
     missing = dict(seen.missing)
     names = {}
     for role in ("frequency", "setpoint"):
@@ -198,7 +198,7 @@ async def _status(unit: Unit, seen: Look) -> Status:
     )
 
 
-async def fault(unit: Unit, *, unverified: bool = False) -> Fault | None:
+async def fault(unit: DriveView, *, unverified: bool = False) -> Fault | None:
     """The present fault, or None.
 
     Raises:
@@ -211,7 +211,7 @@ async def fault(unit: Unit, *, unverified: bool = False) -> Fault | None:
     return (await glance(unit)).fault
 
 
-async def fault_history(unit: Unit, *, unverified: bool = False) -> list[Fault]:
+async def fault_history(unit: DriveView, *, unverified: bool = False) -> list[Fault]:
     """The last faults, the latest first; as many as the drive keeps.
 
     The latest has its `values`: what the drive saw when it tripped, where it keeps that.
@@ -228,7 +228,7 @@ async def fault_history(unit: Unit, *, unverified: bool = False) -> list[Fault]:
     return faults
 
 
-def state_word(unit: Unit, what: str) -> str:
+def state_word(unit: DriveView, what: str) -> str:
     """The name of the state word, for what cannot be done without."""
     reason = unit.evidence.without_state()
     name = unit.profile.role("state")
@@ -238,7 +238,7 @@ def state_word(unit: Unit, what: str) -> str:
     raise unit.evidence.missing(needs, reason or "", Evidence.without_state)
 
 
-def state_of(unit: Unit, word: int) -> State:
+def state_of(unit: DriveView, word: int) -> State:
     """What the state *word* says; unknown where the family has no name for it."""
     try:
         return State(unit.profile.state(word))
@@ -246,12 +246,12 @@ def state_of(unit: Unit, word: int) -> State:
         return State.UNKNOWN
 
 
-def remember(unit: Unit, seen: str) -> None:
+def remember(unit: DriveView, seen: str) -> None:
     """Keeps the last state that was seen, for errors after which none can be read."""
     unit.record.last_state = (seen, unit.bus.now())
 
 
-def seen_last(unit: Unit) -> str:
+def seen_last(unit: DriveView) -> str:
     """The last state that was seen, and how long ago on the line's clock."""
     if unit.record.last_state is None:
         return "no state was ever seen"

@@ -12,8 +12,8 @@ from drivebus import checks
 from drivebus.errors import BadArgument, DrivebusError, NotStopped, Unconfirmed
 from drivebus.operations import commands, motion
 from drivebus.operations.aim import goes_out_at_once
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.halting import WITHIN, Halt
-from drivebus.operations.unit import Unit
 
 __all__ = ["stop_all"]
 
@@ -23,7 +23,7 @@ _STOP = "stop"
 class _Stop:
     """One drive on its way to its proved stop."""
 
-    def __init__(self, unit: Unit, confirm: float, within: float) -> None:
+    def __init__(self, unit: DriveView, confirm: float, within: float) -> None:
         self.address = unit.address
         self.failure: DrivebusError | None = None
         self._unit, self._confirm = motion.halting(unit, _STOP), confirm
@@ -69,7 +69,7 @@ class _Stop:
 
 
 async def stop_all(
-    units: Iterable[Unit], *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False
+    units: Iterable[DriveView], *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False
 ) -> list[int]:
     """Stops *units*, which hang on one line, and returns their addresses. See `drivebus.Bus.stop_all`."""
     confirm = checks.number("confirm", confirm, 0.0, 3600.0)

@@ -8,9 +8,9 @@ from __future__ import annotations
 from drivebus import checks
 from drivebus.errors import BadArgument, DrivebusError
 from drivebus.operations import motion
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
-from drivebus.operations.unit import Unit
 
 __all__ = ["MotorFace", "Turning", "turning_of"]
 
@@ -23,7 +23,7 @@ class Turning:
             to coast; None where it did. The end of the block sends another.
     """
 
-    def __init__(self, unit: Unit, within: float) -> None:
+    def __init__(self, unit: DriveView, within: float) -> None:
         self.unstopped: DrivebusError | None = None
         self._unit = unit
         self._within = checks.number("stop_within", within, 0.0, 3600.0)
@@ -93,7 +93,7 @@ class Turning:
         elif unstopped is not None:
             await self._end(self._unit, self._within)
 
-    async def _end(self, unit: Unit, within: float = WITHIN) -> None:
+    async def _end(self, unit: DriveView, within: float = WITHIN) -> None:
         try:
             await motion.end_run(unit, within, confirm=self._confirm)
         except DrivebusError as error:
@@ -105,7 +105,7 @@ class Turning:
 class MotorFace:
     """What a motor tells of itself, in both faces, without asking the drive."""
 
-    def __init__(self, unit: Unit, within: float) -> None:
+    def __init__(self, unit: DriveView, within: float) -> None:
         self._turning = Turning(unit, within)
 
     def __repr__(self) -> str:

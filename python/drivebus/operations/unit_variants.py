@@ -6,20 +6,20 @@ from collections.abc import Mapping, Set
 
 from drivebus.advice import Advice, Text
 from drivebus.errors import NotReady
+from drivebus.operations.drive_view import DriveView
 from drivebus.operations.raw_words import read_words
-from drivebus.operations.unit import Unit
 from drivebus.profile.evidence import Evidence, not_verified
 from drivebus.profile.facts import Variant
 
 __all__ = ["is_open", "rules", "settled", "undecided"]
 
 
-def rules(unit: Unit) -> Mapping[str, Variant]:
+def rules(unit: DriveView) -> Mapping[str, Variant]:
     """Each variant of the family, with the parameter that decides it and what that may say."""
     return unit.evidence.cached(_rules)
 
 
-def is_open(unit: Unit, name: str) -> bool:
+def is_open(unit: DriveView, name: str) -> bool:
     """Whether a parameter of the drive decides what *name* means, and nobody said how."""
     return unit.profile.describe(name).variant in unit.evidence.cached(undecided)
 
@@ -29,7 +29,7 @@ def undecided(evidence: Evidence) -> Set[str]:
     return set(evidence.cached(_rules)) - set(evidence.profile.variants_chosen)
 
 
-async def settled(unit: Unit, *names: str) -> Unit:
+async def settled(unit: DriveView, *names: str) -> DriveView:
     """The same unit, with everything fixed on which the meaning of *names* depends."""
     still_open = unit.evidence.cached(undecided)
     if not still_open:
@@ -41,13 +41,13 @@ async def settled(unit: Unit, *names: str) -> Unit:
     return unit.with_profile(unit.profile.with_variants({**unit.profile.variants_chosen, **chosen}))
 
 
-def given(unit: Unit, variant: str) -> Text:
+def given(unit: DriveView, variant: str) -> Text:
     """How *variant* is given, for people."""
     choices = ", ".join(map(repr, rules(unit)[variant]["choices"]))
     return Text(Advice("variants", variant, f"variants={{{variant!r}: …}} for bus.drive()"), f" ({choices})")
 
 
-async def _chosen(unit: Unit, variant: str) -> str:
+async def _chosen(unit: DriveView, variant: str) -> str:
     """What the drive's own parameter says of *variant*."""
     rule = rules(unit)[variant]
     parameter, choices = rule.parameter, rule.choices

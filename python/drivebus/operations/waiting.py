@@ -9,14 +9,14 @@ from drivebus.errors import BadArgument, NotReached, Unconfirmed
 from drivebus.look import STANDSTILL
 from drivebus.operations import state
 from drivebus.operations.commands import POLL_INTERVAL
-from drivebus.operations.unit import Unit
+from drivebus.operations.drive_view import DriveView
 from drivebus.values import State, Status
 
 __all__ = ["check_standstill", "wait_for_speed", "wait_until_stopped"]
 
 
 async def wait_for_speed(
-    unit: Unit, hz: float | None = None, tolerance: float = 0.1, timeout: float = 60.0, *, unverified: bool = False
+    unit: DriveView, hz: float | None = None, tolerance: float = 0.1, timeout: float = 60.0, *, unverified: bool = False
 ) -> Status:
     """Waits until the output frequency is *hz*; None: the active setpoint.
 
@@ -49,7 +49,7 @@ async def wait_for_speed(
     return await _wait(unit, reached, f"{goal} was not reached", timeout)
 
 
-def _check_told(unit: Unit, what: str, *roles: str) -> None:
+def _check_told(unit: DriveView, what: str, *roles: str) -> None:
     """Raises `NotAllowed` if the family does not tell its state, or one of *roles*."""
     state.state_word(unit, what)
     for role in roles:
@@ -63,7 +63,7 @@ def _check_told(unit: Unit, what: str, *roles: str) -> None:
         unit.evidence.require_readable([name])
 
 
-async def wait_until_stopped(unit: Unit, timeout: float = 60.0, *, unverified: bool = False) -> Status:
+async def wait_until_stopped(unit: DriveView, timeout: float = 60.0, *, unverified: bool = False) -> Status:
     """Waits until the drive is stopped and its output frequency is zero.
 
     A motor that coasts has no output frequency: its shaft may still turn, and the drive does not know.
@@ -84,13 +84,13 @@ async def wait_until_stopped(unit: Unit, timeout: float = 60.0, *, unverified: b
     return await _wait(unit, stopped, "it did not stop", timeout)
 
 
-def check_standstill(unit: Unit, timeout: float) -> None:
+def check_standstill(unit: DriveView, timeout: float) -> None:
     """Raises `NotAllowed` if `wait_until_stopped` would, before anything moves."""
     checks.number("timeout", timeout, 0.0)
     _check_told(unit, "waiting for the standstill")
 
 
-async def _wait(unit: Unit, reached: Callable[[Status], bool], otherwise: str, timeout: float) -> Status:
+async def _wait(unit: DriveView, reached: Callable[[Status], bool], otherwise: str, timeout: float) -> Status:
     timeout = checks.number("timeout", timeout, 0.0)
     deadline = unit.bus.now() + timeout
     while True:

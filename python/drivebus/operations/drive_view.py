@@ -1,4 +1,4 @@
-"""One unit as one call sees it: a view of what its line knows of it, in the words of one profile."""
+"""One drive as one call sees it: a view of what its line knows of it, in the words of one profile."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from drivebus.line.units import UnitRecord, units_of
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
 
-__all__ = ["Unit"]
+__all__ = ["DriveView"]
 
 
 @dataclass(frozen=True, slots=True)
-class Unit:
-    """One unit as one call sees it. Another bus or more trust make another view of the same record.
+class DriveView:
+    """One drive as one call sees it. Another bus or more trust make another view of the same record.
 
     Attributes:
         bus: The line it hangs on.
@@ -45,7 +45,7 @@ class Unit:
         *,
         unverified: bool,
         trust_profile: bool,
-    ) -> Unit:
+    ) -> DriveView:
         """The unit at *address*, which gave the code *identification*, if it was asked for that."""
         # A line of somebody's own may not say what stands for it.
         record = units_of(getattr(bus, "line", bus)).record(address)
@@ -62,27 +62,27 @@ class Unit:
         """Whether what no document of its family proves is done all the same."""
         return self.evidence.unverified
 
-    def with_bus(self, bus: AwaitableBus) -> Unit:
+    def with_bus(self, bus: AwaitableBus) -> DriveView:
         """The same unit over another face of the same line."""
         return replace(self, bus=bus)
 
-    def trusting(self, unverified: bool) -> Unit:
+    def trusting(self, unverified: bool) -> DriveView:
         """The same unit; if *unverified*, what is not verified is done all the same."""
         if not checks.flag("unverified", unverified) or self.unverified:
             return self
         return replace(self, evidence=self.evidence.trusting(True))
 
-    async def unless_halted(self) -> Unit:
+    async def unless_halted(self) -> DriveView:
         """The same unit, for a start: once somebody tells it to halt, nothing is written to it over this view."""
         if not isinstance(self.bus, AwaitsHalts):
             return self
         return replace(self, halts=await self.bus.halts(self.address))
 
-    def taken_for(self, profile: Profile) -> Unit:
+    def taken_for(self, profile: Profile) -> DriveView:
         """The same unit, which shows that it is of *profile* and not what it was named as; trusted as that."""
         identity = SameUnit(self.bus, self.record, profile)
         return replace(self, evidence=Evidence(profile, self.address, True), identity=identity)
 
-    def with_profile(self, profile: Profile) -> Unit:
+    def with_profile(self, profile: Profile) -> DriveView:
         """The same unit, whose words are known better: by *profile*."""
         return replace(self, evidence=self.evidence.of(profile))
