@@ -1,5 +1,5 @@
 //! The rules of "never a wrong answer", one by one and to the nanosecond: what is open, what that makes of the next answer, and
-//! how it ends. `attribution.rs` beside it looks for a wrong answer, whatever the rules are.
+//! how it ends. `frames/attribution.rs` looks for a wrong answer, whatever the rules are.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
 mod agreement;

@@ -2,7 +2,6 @@
 //!
 //! A share of a range is counted where 16384 counts are 100 % (4000H, Danfoss FC 300 design guide MG33BE02, p. 195) or 20000.
 //! What must come out is worked out here, with plain fractions.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,5 +1,4 @@
 //! Broken profiles: file, line and reason, and never a panic.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

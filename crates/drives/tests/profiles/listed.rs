@@ -1,5 +1,4 @@
 //! Parameters whose codes say nothing of their addresses, as most makers number them.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,5 +1,4 @@
 //! Profiles over profiles: what an overlay adds, what a sister family takes over, and how much of it is then trusted.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::fs;
 use std::path::PathBuf;

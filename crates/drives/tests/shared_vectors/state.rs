@@ -1,6 +1,5 @@
 //! What a state word means where several of its rules fit: a motor that runs is never told to rest, in whatever order a
 //! profile has its rows.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::path::Path;
 

@@ -1,5 +1,4 @@
 //! Moments and durations at their ends: whatever a caller gives, time never runs over, and nothing panics.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use drivebus_rtu::*;
 use proptest::prelude::*;

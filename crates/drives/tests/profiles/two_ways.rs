@@ -2,7 +2,6 @@
 //!
 //! The address is that of Mitsubishi's inverters (0008H: "inverter status/control input instruction"); the drive does not
 //! exist.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

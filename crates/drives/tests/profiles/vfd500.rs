@@ -1,7 +1,6 @@
 //! The VFD500 profile against tables typed from its manual (easymanua.ls danfoss vfd500-series, pp. 96, 97, 135 to 137).
 //!
 //! The tables are not produced by the code. Where the manual misprints, the row says what is right.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::sync::Arc;
 

@@ -1,9 +1,6 @@
 //! Frames come out of any stream, however it is cut, and noise comes out as noise.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod common;
-
-use common::{answers, requests};
+use crate::common::{answers, requests};
 use drivebus_rtu::*;
 use proptest::prelude::*;
 

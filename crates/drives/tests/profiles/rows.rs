@@ -2,7 +2,6 @@
 //! one count beyond each end.
 //!
 //! What must come out is worked out here, from the text of the tables with plain whole numbers, not by the profile.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

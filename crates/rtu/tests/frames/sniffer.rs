@@ -2,10 +2,6 @@
 //!
 //! A master asks units in turn, gives up and asks again; units answer, late too; faults damage, lose, repeat and insert.
 //! An adapter hands the bytes over in lumps. What the sniffer pairs must be a pair.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
-#![allow(clippy::cast_possible_truncation, reason = "small numbers")]
-
-mod common;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -13,7 +9,7 @@ use std::ops::Range;
 use drivebus_rtu::*;
 use proptest::prelude::*;
 
-use common::requests;
+use crate::common::requests;
 
 const TIMEOUT: u64 = 500_000_000;
 const MS: u64 = 1_000_000;

@@ -1,5 +1,4 @@
 //! The planner against a search through every possible plan.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use drivebus_drives::{Access, Entry, Profile, ReadCost, ReadSpan, Table, plan_reads};
 use proptest::prelude::*;

@@ -1,5 +1,4 @@
 //! What a unit hears on a shared line.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use drivebus_rtu::*;
 

@@ -1,9 +1,6 @@
 //! Every request and answer survives the wire; everything else is refused or taken as it is, never misread.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod common;
-
-use common::{answers, exchanges, requests};
+use crate::common::{answers, exchanges, requests};
 use drivebus_rtu::*;
 use proptest::prelude::*;
 

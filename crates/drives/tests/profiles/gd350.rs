@@ -1,7 +1,6 @@
 //! The GD350 profile against a table typed from the manual: GD350 operation manual, chapter 9.4 (INVT ebook 2645).
 //!
 //! The table is not produced by the code. Where the manual misprints, the row says what is right.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

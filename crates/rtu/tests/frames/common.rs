@@ -1,13 +1,10 @@
 //! Arbitrary requests and answers, owned so that proptest can keep them.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-#![allow(dead_code, reason = "each test file uses its part")]
-#![allow(unreachable_pub, reason = "a module of several test crates")]
 
 use drivebus_rtu::*;
 use proptest::prelude::*;
 
 #[derive(Debug, Clone)]
-pub enum Owned {
+pub(crate) enum Owned {
     Read(u16, u16),
     Write(u16, u16),
     Echo(u16),
@@ -21,8 +18,8 @@ pub enum Owned {
     Custom(Vec<u8>),
 }
 
-pub struct OwnedRequest(pub Owned);
-pub struct OwnedAnswer(pub Owned);
+pub(crate) struct OwnedRequest(pub(crate) Owned);
+pub(crate) struct OwnedAnswer(pub(crate) Owned);
 
 impl std::fmt::Debug for OwnedRequest {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -37,7 +34,7 @@ impl std::fmt::Debug for OwnedAnswer {
 }
 
 impl OwnedRequest {
-    pub fn borrow(&self) -> Request<'_> {
+    pub(crate) fn borrow(&self) -> Request<'_> {
         match &self.0 {
             Owned::Read(address, count) => Request::read(*address, *count).unwrap(),
             Owned::Write(address, value) => Request::write(*address, *value),
@@ -52,7 +49,7 @@ impl OwnedRequest {
 }
 
 impl OwnedAnswer {
-    pub fn borrow(&self) -> Answer<'_> {
+    pub(crate) fn borrow(&self) -> Answer<'_> {
         match &self.0 {
             Owned::Words(words) => Answer::read(words).unwrap(),
             Owned::WordsOf(table, words) => Answer::read_of(*table, words).unwrap(),
@@ -92,7 +89,7 @@ fn custom() -> impl Strategy<Value = Owned> {
         .prop_map(|(function, data)| Owned::Custom([vec![function], data].concat()))
 }
 
-pub fn requests() -> impl Strategy<Value = OwnedRequest> {
+pub(crate) fn requests() -> impl Strategy<Value = OwnedRequest> {
     prop_oneof![
         (0..=0xFF00_u16, 1..=125_u16).prop_map(|(address, count)| Owned::Read(address, count)),
         (tables(), 0..=0xF000_u16, 1..=2000_u16).prop_map(|(table, address, count)| Owned::ReadOf(
@@ -109,7 +106,7 @@ pub fn requests() -> impl Strategy<Value = OwnedRequest> {
     .prop_map(OwnedRequest)
 }
 
-pub fn answers() -> impl Strategy<Value = OwnedAnswer> {
+pub(crate) fn answers() -> impl Strategy<Value = OwnedAnswer> {
     prop_oneof![
         words(125).prop_map(Owned::Words),
         tables().prop_flat_map(words_of),
@@ -124,7 +121,7 @@ pub fn answers() -> impl Strategy<Value = OwnedAnswer> {
 }
 
 /// A request with an answer that a unit could give to it. Few addresses and values, so that strangers often fit.
-pub fn exchanges() -> impl Strategy<Value = Exchange> {
+pub(crate) fn exchanges() -> impl Strategy<Value = Exchange> {
     let small = || 0..3_u16;
     prop_oneof![
         (small(), prop::collection::vec(small(), 1..=3)).prop_map(|(address, words)| (
@@ -147,10 +144,10 @@ pub fn exchanges() -> impl Strategy<Value = Exchange> {
 }
 
 #[derive(Debug)]
-pub struct Exchange(OwnedRequest, OwnedAnswer);
+pub(crate) struct Exchange(OwnedRequest, OwnedAnswer);
 
 impl Exchange {
-    pub fn borrow(&self) -> (Request<'_>, Answer<'_>) {
+    pub(crate) fn borrow(&self) -> (Request<'_>, Answer<'_>) {
         (self.0.borrow(), self.1.borrow())
     }
 }

@@ -1,5 +1,4 @@
 //! The master over a scripted line: silence, time-outs, and answers that are not the answer.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use drivebus_rtu::*;
 

@@ -2,7 +2,6 @@
 //!
 //! The drive does not exist. Its bits are those of CiA 402 (switch on 0, voltage 1, no quick stop 2, operation 3, reset 7) with
 //! the reversal at 11; the words beside the tables are computed by hand.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::fs;
 use std::path::PathBuf;

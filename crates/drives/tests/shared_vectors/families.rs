@@ -1,6 +1,5 @@
 //! Every family against `tests/vectors/families.toml`, a table typed from the manuals: commands, states, memory,
 //! exceptions, identification codes, and worked examples. Python walks the same file in `tests/python/test_families.py`.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -5,8 +5,6 @@
 //! in lumps, puts noise around, and lets a late answer through, or garbles it, while the master is sending. When it is
 //! opened, every unit may owe another program an answer. Behind a gateway answers come in any order.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::collections::{BTreeMap, VecDeque};
 
 use drivebus_rtu::*;
