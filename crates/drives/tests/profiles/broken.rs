@@ -1,10 +1,12 @@
 //! Broken profiles: file, line and reason, and never a panic.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use drivebus_drives::{Profile, ProfileError};
 use proptest::prelude::*;
+
+use crate::folder::Folder;
 
 const FILES: [&str; 4] = ["profile.toml", "registers.csv", "parameters.csv", "faults.csv"];
 
@@ -12,33 +14,10 @@ fn shipped(file: &str) -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("profiles/gd350").join(file)).unwrap()
 }
 
-/// A folder with a copy of the shipped profile, removed when it is dropped.
-struct Copy(PathBuf);
-
-impl Copy {
-    fn new(name: &str) -> Self {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("profile-{name}-{}", std::process::id()));
-        fs::create_dir_all(&folder).unwrap();
-        for file in FILES {
-            fs::write(folder.join(file), shipped(file)).unwrap();
-        }
-        Self(folder)
-    }
-
-    fn write(&self, file: &str, text: impl AsRef<[u8]>) {
-        fs::write(self.0.join(file), text).unwrap();
-    }
-
-    fn load(&self) -> Result<Profile, ProfileError> {
-        Profile::load(&self.0)
-    }
-}
-
-impl Drop for Copy {
-    fn drop(&mut self) {
-        // A folder left behind in the build directory harms nobody.
-        drop(fs::remove_dir_all(&self.0));
-    }
+/// A folder with a copy of the shipped profile.
+fn copy(name: &str) -> Folder {
+    let texts = FILES.map(|file| (file, shipped(file)));
+    Folder::new(&format!("broken-{name}"), &texts.each_ref().map(|(file, text)| (*file, text.as_str())))
 }
 
 /// The line, from 1, of the first place where `text` holds `part`.
@@ -49,7 +28,7 @@ fn line_of(text: &str, part: &str) -> u64 {
 
 #[test]
 fn the_shipped_folder_loads_as_the_shipped_profile() {
-    let copy = Copy::new("same");
+    let copy = copy("same");
     assert_eq!(copy.load().unwrap(), *Profile::builtin("gd350").unwrap());
     // Some editors put a mark before UTF-8, and some systems end lines with two characters.
     for file in FILES {
@@ -60,7 +39,7 @@ fn the_shipped_folder_loads_as_the_shipped_profile() {
 
 #[test]
 fn every_mistake_names_file_line_and_reason() {
-    let copy = Copy::new("broken");
+    let copy = copy("broken");
     for (file, right, wrong, reason) in [
         // The shape of profile.toml.
         ("profile.toml", "title = \"INVT Goodrive350\"", "title = 350", "string"),
@@ -151,7 +130,7 @@ fn every_mistake_names_file_line_and_reason() {
 
 #[test]
 fn repeated_rows_of_the_manifest_are_named_by_their_line() {
-    let copy = Copy::new("repeated");
+    let copy = copy("repeated");
     let text = shipped("profile.toml");
     for (row, reason) in [
         ("[[exceptions]]\ncode = 0x01\nname = \"x\"\nmeaning = \"x\"\nsource = \"x\"\n", "01H is there twice"),
@@ -176,7 +155,7 @@ fn repeated_rows_of_the_manifest_are_named_by_their_line() {
 
 #[test]
 fn files_that_cannot_be_read_are_named() {
-    let copy = Copy::new("unreadable");
+    let copy = copy("unreadable");
     for file in FILES {
         fs::remove_file(copy.0.join(file)).unwrap();
         match copy.load() {
@@ -200,7 +179,7 @@ proptest! {
     /// Whatever is cut out of a file and put in its place: a profile or an error, never a panic.
     #[test]
     fn no_damage_panics(file in 0_usize..4, at in 0.0..1.0, cut in 0_usize..40, put in "[a-z0-9,=\"\\n\\[\\].-]{0,8}") {
-        let copy = Copy::new("damaged");
+        let copy = copy("damaged");
         let text = shipped(FILES[file]);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "any place will do")]
         let start = (at * text.len() as f64) as usize;
@@ -214,7 +193,7 @@ proptest! {
 
 #[test]
 fn a_watchdog_may_be_missing_and_must_not_be_empty() {
-    let copy = Copy::new("watchdog");
+    let copy = copy("watchdog");
     let text = shipped("profile.toml");
     let (before, rest) = text.split_once("[watchdog]").unwrap();
     let (table, after) = rest.split_once("\n\n").unwrap();

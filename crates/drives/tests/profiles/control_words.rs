@@ -3,10 +3,9 @@
 //! The drive does not exist. Its bits are those of CiA 402 (switch on 0, voltage 1, no quick stop 2, operation 3, reset 7) with
 //! the reversal at 11; the words beside the tables are computed by hand.
 
-use std::fs;
-use std::path::PathBuf;
+use drivebus_drives::{Command, Profile, State};
 
-use drivebus_drives::{Command, Profile, ProfileError, State};
+use crate::folder::{FAULTS, Folder};
 
 const HEAD: &str = r#"name = "bits"
 title = "Bits"
@@ -67,43 +66,21 @@ const REGISTERS: &str = "address,name,label,unit,scale,signed,low,high,high_from
 0x2100,status,Status word,,1,no,,,,ro,yes,,x
 ";
 const PARAMETERS: &str = "code,address,name,label,unit,scale,signed,low,low_from,high,high_from,default,access,choices,verified,note,source\n";
-const FAULTS: &str = "code,mnemonic,label,cause,remedy,verified,note,source\n";
 
-/// A folder of a test's own, removed when it is dropped.
-struct Folder(PathBuf);
-
-impl Folder {
-    /// The drive with `[commands]` of these texts: before the codes, the codes, and behind them.
-    fn new(name: &str, before: &str, codes: &str, behind: &str, state: &str) -> Self {
-        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("bits-{name}-{}", std::process::id()));
-        fs::create_dir_all(&folder).unwrap();
-        let commands = format!(
-            "[commands]\nregister = \"control\"\nmoves = [\"control\", \"alarm_reset\"]\nsource = \"Bits manual\"\n{before}\n\
+/// The drive with `[commands]` of these texts: before the codes, the codes, and behind them.
+fn folder_of(name: &str, before: &str, codes: &str, behind: &str, state: &str) -> Folder {
+    let commands = format!(
+        "[commands]\nregister = \"control\"\nmoves = [\"control\", \"alarm_reset\"]\nsource = \"Bits manual\"\n{before}\n\
              [commands.codes]\n{codes}\n{behind}\n"
-        );
-        let manifest = format!("{HEAD}{commands}{state}{BITS}");
-        let files = [
-            ("profile.toml", manifest.as_str()),
-            ("registers.csv", REGISTERS),
-            ("parameters.csv", PARAMETERS),
-            ("faults.csv", FAULTS),
-        ];
-        for (file, text) in files {
-            fs::write(folder.join(file), text).unwrap();
-        }
-        Self(folder)
-    }
-
-    fn load(&self) -> Result<Profile, ProfileError> {
-        Profile::load(&self.0)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // A folder left behind in the build directory harms nobody.
-        drop(fs::remove_dir_all(&self.0));
-    }
+    );
+    let manifest = format!("{HEAD}{commands}{state}{BITS}");
+    let files = [
+        ("profile.toml", manifest.as_str()),
+        ("registers.csv", REGISTERS),
+        ("parameters.csv", PARAMETERS),
+        ("faults.csv", FAULTS),
+    ];
+    Folder::new(&format!("bits-{name}"), &files)
 }
 
 const CODES: &str = "
@@ -125,7 +102,7 @@ until = { ready = 1, on = 1, fault = 0 }
 
 #[test]
 fn a_word_is_made_of_its_bits_and_those_that_nobody_names_are_0() {
-    let profile = Folder::new("words", "", CODES, "", STATE).load().unwrap();
+    let profile = folder_of("words", "", CODES, "", STATE).load().unwrap();
     let word = |command| profile.command(command).unwrap();
     assert_eq!(word(Command::RunForward), (0x2000.into(), 0x000F));
     assert_eq!(word(Command::RunReverse), (0x2000.into(), 0x080F));
@@ -141,7 +118,7 @@ fn a_base_says_what_each_word_of_bits_has_and_a_number_is_whole_by_itself() {
     // 43CH with bit 6, 7 or 15: Danfoss has such words. Here they stand for no drive.
     let codes = "run_forward = { enable = 1 }\nrun_reverse = { enable = 1, reverse = 1 }\nstop = {}\ncoast = 0x0004";
     for base in ["base = 0x0436", "base = { voltage = 1, no_quick_stop = 1, mode = 3 }"] {
-        let profile = Folder::new("base", base, codes, "", STATE).load().unwrap();
+        let profile = folder_of("base", base, codes, "", STATE).load().unwrap();
         // 0436H is 0000 0100 0011 0110; mode = 3 is 30H, voltage and no quick stop are 06H.
         let high = if base.contains("0x") { 0x0400 } else { 0 };
         let word = |command| profile.command(command).unwrap().1;
@@ -151,13 +128,13 @@ fn a_base_says_what_each_word_of_bits_has_and_a_number_is_whole_by_itself() {
         assert_eq!(word(Command::Coast), 0x0004);
     }
     // A field of the word itself goes over the base.
-    let over = Folder::new("over", "base = { mode = 5 }", "stop = { mode = 2 }", "", STATE).load().unwrap();
+    let over = folder_of("over", "base = { mode = 5 }", "stop = { mode = 2 }", "", STATE).load().unwrap();
     assert_eq!(over.command(Command::Stop), Some((0x2000.into(), 0x0020)));
 }
 
 #[test]
 fn a_sequence_is_kept_in_its_order_with_what_it_waits_for() {
-    let profile = Folder::new("order", "", CODES, SEQUENCE, STATE).load().unwrap();
+    let profile = folder_of("order", "", CODES, SEQUENCE, STATE).load().unwrap();
     let [shutdown, switch_on] = profile.start_sequence() else { panic!("two words") };
     assert_eq!((shutdown.word, shutdown.label.as_str()), (0x0006, "shutdown"));
     let until: Vec<_> = shutdown.until.iter().map(|until| (until.field.as_str(), until.mask, until.value)).collect();
@@ -177,8 +154,8 @@ fn a_sequence_is_kept_in_its_order_with_what_it_waits_for() {
 #[test]
 fn what_cannot_be_meant_is_refused() {
     let wrong = |name: &str, before: &str, codes: &str, behind: &str, state: &str, says: &[&str]| {
-        let folder = Folder::new(name, before, codes, behind, state);
-        let reasons: Vec<String> = Profile::check(&folder.0).iter().map(ToString::to_string).collect();
+        let folder = folder_of(name, before, codes, behind, state);
+        let reasons = folder.reasons();
         assert_eq!(reasons.len(), says.len(), "{name}: {reasons:?}");
         for (reason, says) in reasons.iter().zip(says) {
             assert!(reason.contains(says), "{name}: \"{says}\" in {reason}");
@@ -224,21 +201,21 @@ fn what_cannot_be_meant_is_refused() {
 
 #[test]
 fn another_state_word_needs_another_sequence() {
-    let below = Folder::new("below-state", "", CODES, SEQUENCE, STATE);
+    let below = folder_of("below-state", "", CODES, SEQUENCE, STATE);
     let name = below.0.file_name().unwrap().to_str().unwrap().to_owned();
-    let above = Folder::new("above-state", "", CODES, "", STATE);
+    let above = folder_of("above-state", "", CODES, "", STATE);
     let table = "address,name,label,unit,scale,signed,low,high,high_from,access,verified,note,source
 0x2200,other_status,Another,,1,no,,,,ro,yes,,x\n";
-    fs::write(above.0.join("registers.csv"), table).unwrap();
+    above.write("registers.csv", table);
     let manifest = format!(
         "name = \"over\"\nsource = \"x\"\n[overlay]\nprofile = \"../{name}\"\n[state]\nregister = \"other_status\"\n\
          source = \"x\"\n[state.codes]\nforward = 1\nstopped = 2\n"
     );
-    fs::write(above.0.join("profile.toml"), &manifest).unwrap();
+    above.write("profile.toml", &manifest);
     let said = Profile::check(&above.0).iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
     assert!(said.contains("\"shutdown\" waits for on of other_status"), "{said}");
     // Without a change of state the sequence is taken over.
     let manifest = format!("name = \"over\"\nsource = \"x\"\n[overlay]\nprofile = \"../{name}\"\n");
-    fs::write(above.0.join("profile.toml"), manifest).unwrap();
+    above.write("profile.toml", manifest);
     assert_eq!(above.load().unwrap().start_sequence().len(), 2);
 }

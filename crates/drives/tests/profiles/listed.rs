@@ -1,9 +1,8 @@
 //! Parameters whose codes say nothing of their addresses, as most makers number them.
 
-use std::fs;
-use std::path::PathBuf;
+use drivebus_drives::{NameError, Store};
 
-use drivebus_drives::{NameError, Profile, Store};
+use crate::folder::{FAULTS, Folder, REGISTERS};
 
 const TOML: &str = r#"
 name = "ex3"
@@ -42,41 +41,16 @@ P00.11,0007H,Not at 000BH,,1,no,0,,9,C1-01,,run,,yes,,p. 24
 U2-02,0081H,Last fault,,1,no,,,,,,ro,,yes,,p. 25
 ";
 
-/// A folder of a test's own, removed when it is dropped.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str, toml: &str, parameters: &str) -> Self {
-        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("listed-{name}-{}", std::process::id()));
-        fs::create_dir_all(&folder).unwrap();
-        for (file, text) in [
-            ("profile.toml", toml),
-            ("parameters.csv", parameters),
-            ("registers.csv", "address,name,label,unit,scale,signed,low,high,high_from,access,verified,note,source\n"),
-            ("faults.csv", "code,mnemonic,label,cause,remedy,verified,note,source\n"),
-        ] {
-            fs::write(folder.join(file), text).unwrap();
-        }
-        Self(folder)
-    }
-
-    /// What is wrong with it.
-    fn reasons(&self) -> Vec<String> {
-        Profile::check(&self.0).iter().map(ToString::to_string).collect()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // A folder left behind in the build directory harms nobody.
-        drop(fs::remove_dir_all(&self.0));
-    }
+fn folder_of(name: &str, toml: &str, parameters: &str) -> Folder {
+    let files =
+        [("profile.toml", toml), ("parameters.csv", parameters), ("registers.csv", REGISTERS), ("faults.csv", FAULTS)];
+    Folder::new(&format!("listed-{name}"), &files)
 }
 
 #[test]
 fn each_row_says_its_own_address() {
-    let folder = Folder::new("own", TOML, &format!("{HEAD}{ROWS}"));
-    let profile = Profile::load(&folder.0).unwrap();
+    let folder = folder_of("own", TOML, &format!("{HEAD}{ROWS}"));
+    let profile = folder.load().unwrap();
     for (code, address) in
         [("C1-01", 0x0200), ("c1-01", 0x0200), ("b1-02", 0x0181), ("P00.11", 0x0007), ("p0.11", 0x0007)]
     {
@@ -95,8 +69,8 @@ fn each_row_says_its_own_address() {
 /// A code that another maker would find at an address of the rule must not find what is there.
 #[test]
 fn a_code_by_the_rule_finds_no_parameter_that_has_another() {
-    let folder = Folder::new("rule", TOML, &format!("{HEAD}{ROWS}"));
-    let profile = Profile::load(&folder.0).unwrap();
+    let folder = folder_of("rule", TOML, &format!("{HEAD}{ROWS}"));
+    let profile = folder.load().unwrap();
     assert_eq!(profile.find("0007H").unwrap().code(), Some("P00.11"));
     for code in ["P00.07", "P02.00", "P01.129"] {
         assert!(matches!(profile.find(code), Err(NameError::Unknown { .. })), "{code}");
@@ -119,7 +93,7 @@ fn what_is_wrong_is_said() {
         ("C1-02,8201H,", "bit 15 says where a write is kept"),
     ] {
         let rows = format!("{HEAD}{ROWS}{row}Another,s,10,no,,,,,,run,,yes,,p. 21\n");
-        let [only] = Folder::new("wrong", TOML, &rows).reasons().try_into().unwrap();
+        let [only] = folder_of("wrong", TOML, &rows).reasons().try_into().unwrap();
         assert!(only.contains("parameters.csv, line 8: ") && only.contains(reason), "{only}");
     }
 }
@@ -131,12 +105,12 @@ fn the_rule_has_exceptions_that_say_so() {
     let rows =
         "P05.06,,By the rule,s,10,no,,,,,,run,,yes,,p. 21\nP05.7,0x1234,Elsewhere,s,10,no,,,,,,run,,yes,,p. 21\n";
     let rows = format!("{HEAD}{}{rows}", ROWS.replace("P00.11", "P00.01"));
-    let folder = Folder::new("exception", &toml, &rows);
-    let profile = Profile::load(&folder.0).unwrap();
+    let folder = folder_of("exception", &toml, &rows);
+    let profile = folder.load().unwrap();
     for (code, address) in [("P05.06", 0x0506), ("P05.07", 0x1234), ("C1-01", 0x0200)] {
         assert_eq!(profile.find(code).unwrap().address(), Some(address), "{code}");
     }
     let without = format!("{rows}C1-02,,No address,s,10,no,,,,,,run,,yes,,p. 21\n");
-    let [only] = Folder::new("without", &toml, &without).reasons().try_into().unwrap();
+    let [only] = folder_of("without", &toml, &without).reasons().try_into().unwrap();
     assert!(only.contains("must be like P05.06; of any other the row must say the \"address\""), "{only}");
 }

@@ -3,6 +3,7 @@
 
 mod broken;
 mod control_words;
+mod folder;
 mod gd350;
 mod listed;
 mod names;

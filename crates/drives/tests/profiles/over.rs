@@ -1,43 +1,8 @@
 //! Profiles over profiles: what an overlay adds, what a sister family takes over, and how much of it is then trusted.
 
-use std::fs;
-use std::path::PathBuf;
+use drivebus_drives::{Command, Evidence, Profile, State, Store};
 
-use drivebus_drives::{Command, Evidence, Profile, ProfileError, State, Store};
-
-/// A folder of a test's own, removed when it is dropped.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str, files: &[(&str, &str)]) -> Self {
-        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("over-{name}-{}", std::process::id()));
-        for (file, text) in files {
-            let path = folder.join(file);
-            fs::create_dir_all(path.parent().unwrap()).unwrap();
-            fs::write(path, text).unwrap();
-        }
-        Self(folder)
-    }
-
-    fn load(&self) -> Result<Profile, ProfileError> {
-        Profile::load(&self.0)
-    }
-
-    /// The reasons of all that is wrong with it.
-    fn reasons(&self) -> Vec<String> {
-        Profile::check(&self.0).iter().map(ToString::to_string).collect()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // A folder left behind in the build directory harms nobody.
-        drop(fs::remove_dir_all(&self.0));
-    }
-}
-
-const REGISTERS: &str = "address,name,label,unit,scale,signed,low,high,high_from,access,verified,note,source\n";
-const FAULTS: &str = "code,mnemonic,label,cause,remedy,verified,note,source\n";
+use crate::folder::{FAULTS, Folder, REGISTERS};
 
 #[test]
 fn a_bit_without_values_is_off_or_on_and_several_are_a_number() {
@@ -127,7 +92,7 @@ fn what_lies_below_must_be_there_and_end_somewhere() {
     let manifest = |table: &str| format!("name = \"mine\"\nsource = \"me\"\n{table}\n");
     for (name, table, reason) in [
         ("unknown", "[overlay]\nprofile = \"gd35o\"", "the closest is \"gd35"),
-        ("itself", "[overlay]\nprofile = \"./../over-itself-PID\"", "leads back to this profile"),
+        ("itself", "[overlay]\nprofile = \"./../itself-PID\"", "leads back to this profile"),
         ("absolute", "[overlay]\nprofile = \"/etc\"", "relative to this one"),
         ("both", "[overlay]\nprofile = \"gd350\"\n[extends]\nprofile = \"gd350\"\nassumption = \"so\"", "not both"),
         ("silent", "[extends]\nprofile = \"gd350\"\nassumption = \" \"", "\"assumption\" is empty"),
@@ -201,9 +166,9 @@ fn a_row_without_an_address_waits_for_one() {
 
     let own = folder.0.file_name().unwrap().to_string_lossy().into_owned();
     let above = format!("name = \"full\"\nsource = \"me\"\n[overlay]\nprofile = \"../../{own}\"\n");
-    fs::write(folder.0.join("full/profile.toml"), above).unwrap();
+    folder.write("full/profile.toml", above);
     let row = format!("{REGISTERS}0x3020,oil_pressure,Oil pressure,bar,10,no,,,,ro,yes,,sheet 4\n");
-    fs::write(folder.0.join("full/registers.csv"), row).unwrap();
+    folder.write("full/registers.csv", row);
     let full = Profile::load(&folder.0.join("full")).unwrap();
     assert_eq!(full.find("oil_pressure").unwrap().address(), Some(0x3020));
     assert_eq!((full.family(), full.entries().count()), ("gd350", partly.entries().count()));
@@ -352,8 +317,7 @@ fn what_a_parameter_decides_in_one_family_is_not_verified_in_its_sister() {
     let sister = format!(
         "name = \"sister\"\nsource = \"x\"\n[extends]\nprofile = \"../../{own}\"\nassumption = \"So it is said.\"\n"
     );
-    fs::create_dir_all(below.0.join("sister")).unwrap();
-    fs::write(below.0.join("sister/profile.toml"), sister).unwrap();
+    below.write("sister/profile.toml", sister);
     let profile = Profile::load(&below.0.join("sister")).unwrap();
     let unit = &profile.variants()["speed_unit"];
     assert!(!unit.verified && unit.note.starts_with("So it is said."), "{}", unit.note);

@@ -3,11 +3,10 @@
 //! A share of a range is counted where 16384 counts are 100 % (4000H, Danfoss FC 300 design guide MG33BE02, p. 195) or 20000.
 //! What must come out is worked out here, with plain fractions.
 
-use std::fs;
-use std::path::PathBuf;
-
 use drivebus_drives::{Entry, Input, Profile, ValueError};
 use proptest::prelude::*;
+
+use crate::folder::{FAULTS, Folder};
 
 const TOML: &str = r#"
 name = "ex5"
@@ -53,34 +52,18 @@ code,address,label,unit,scale,signed,words,order,low,low_from,high,high_from,def
 3-10,0x0C1B,Preset reference,%,16384/100,yes,,,-100,,100,,25,run,,yes,,p. 2
 ";
 
-/// A folder of a test's own, removed when it is dropped.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str, toml: &str, rows: &str) -> Self {
-        let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("scales-{name}-{}", std::process::id()));
-        fs::create_dir_all(&folder).unwrap();
-        for (file, text) in [
-            ("profile.toml", toml),
-            ("registers.csv", &format!("{REGISTERS}{rows}")),
-            ("parameters.csv", PARAMETERS),
-            ("faults.csv", "code,mnemonic,label,cause,remedy,verified,note,source\n"),
-        ] {
-            fs::write(folder.join(file), text).unwrap();
-        }
-        Self(folder)
-    }
-
-    fn load(name: &str) -> Profile {
-        Profile::load(&Self::new(name, TOML, ROWS).0).unwrap()
-    }
+fn folder_of(name: &str, toml: &str, rows: &str) -> Folder {
+    let files = [
+        ("profile.toml", toml),
+        ("registers.csv", &format!("{REGISTERS}{rows}")),
+        ("parameters.csv", PARAMETERS),
+        ("faults.csv", FAULTS),
+    ];
+    Folder::new(&format!("scales-{name}"), &files)
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // A folder left behind in the build directory harms nobody.
-        drop(fs::remove_dir_all(&self.0));
-    }
+fn load(name: &str) -> Profile {
+    folder_of(name, TOML, ROWS).load().unwrap()
 }
 
 /// `raw` as a number, and as one of `digits` after the point: the nearest, and of two the one farther from zero.
@@ -101,7 +84,7 @@ fn encoded(entry: &Entry, text: &str) -> u16 {
 
 #[test]
 fn every_word_of_a_share_goes_around_and_reads_differently() {
-    let profile = Folder::load("words");
+    let profile = load("words");
     for (name, ratio, digits, low, high) in [
         ("percent", (16_384, 100), 3, -16_384, 16_384),
         ("plain", (16_384, 100), 3, 0, 65_535),
@@ -130,7 +113,7 @@ fn every_word_of_a_share_goes_around_and_reads_differently() {
 
 #[test]
 fn a_value_is_the_nearest_count_and_finer_ones_are_refused_with_their_neighbours() {
-    let profile = Folder::load("nearest");
+    let profile = load("nearest");
     let percent = profile.find("percent").unwrap();
     // × 163.84: 8192; 5461.28; 0.4915; 0.6554; -16384.
     for (text, word) in
@@ -162,7 +145,7 @@ fn a_value_is_the_nearest_count_and_finer_ones_are_refused_with_their_neighbours
 
 #[test]
 fn a_frequency_is_a_share_of_what_a_parameter_of_the_drive_says() {
-    let profile = Folder::load("variant");
+    let profile = load("variant");
     assert!(profile.find("speed").unwrap().encode(Input::Decimal("10")).is_err(), "nobody has said of what");
     // 10 Hz of 50 is 3276.8 counts, of 60 Hz 2730.67; full speed is 16384.
     for (choice, hertz, word) in
@@ -180,7 +163,7 @@ fn a_frequency_is_a_share_of_what_a_parameter_of_the_drive_says() {
 
 #[test]
 fn of_two_words_the_high_one_may_come_first() {
-    let profile = Folder::load("order");
+    let profile = load("order");
     let value =
         |name: &str, words: [u16; 2]| profile.find(name).unwrap().quantity().decode_words(&words).unwrap().to_string();
     assert_eq!(value("energy", [0x86A0, 0x0001]), "10000.0");
@@ -218,8 +201,8 @@ fn what_is_wrong_is_said() {
             "\"order\" is \"big\" and must be low first or high first".into(),
         ),
     ] {
-        let folder = Folder::new("wrong", TOML, &format!("{ROWS}{row}\n"));
-        let reasons: Vec<String> = Profile::check(&folder.0).iter().map(ToString::to_string).collect();
+        let folder = folder_of("wrong", TOML, &format!("{ROWS}{row}\n"));
+        let reasons = folder.reasons();
         // 50.003 % is the same count as 50 %, so that range is one value.
         if row.contains("50.003") {
             assert_eq!(reasons, Vec::<String>::new());
@@ -233,7 +216,7 @@ fn what_is_wrong_is_said() {
         ("16384", "scale 16384 must be 1, 10, 100, 1000 or 10000, or a ratio such as \"16384/100\""),
         ("true", "scale must be a number, or a ratio as text such as \"16384/100\""),
     ] {
-        let folder = Folder::new("table", &TOML.replace("\"16384/50\"", scale), ROWS);
+        let folder = folder_of("table", &TOML.replace("\"16384/50\"", scale), ROWS);
         let [only] = Profile::check(&folder.0).try_into().unwrap();
         assert!(only.to_string().contains(reason), "{only}");
     }
@@ -248,7 +231,7 @@ proptest! {
         let row = format!(
             "0x0020,any,Any,%,{counts}/{units},{},,,,,,,rw,yes,,p. 1\n", if signed { "yes" } else { "no" }
         );
-        let profile = Profile::load(&Folder::new("any", TOML, &row).0).unwrap();
+        let profile = folder_of("any", TOML, &row).load().unwrap();
         let any = profile.find("any").unwrap();
         let value = any.decode(raw);
         prop_assert_eq!(any.encode(value.to_f64()), Ok(raw));
