@@ -32,7 +32,7 @@ pytestmark = [pytest.mark.skipif(os.name == "nt", reason="no pty"), pytest.mark.
 OPEN = """
 import os, sys, threading, time
 import drivebus
-bus = drivebus.Bus(sys.argv[1], parity="N", timeout=0.3)
+bus = drivebus.Bus(sys.argv[1], parity="N", timeout=1.0)
 drive = bus.drive(1, "gd350")
 def say(*words): print(*words, flush=True)
 """
@@ -154,7 +154,7 @@ def test_who_opens_the_port_later_halts_before_anything_else_and_says_so(shop: W
     with program(shop, RUNS) as owner:
         kill(owner)
     opened = time.monotonic()
-    with drivebus.Bus(shop.port, parity="N", timeout=0.3) as bus:
+    with drivebus.Bus(shop.port, parity="N", timeout=1.0) as bus:
         assert bus.drive(1, "gd350").state() is drivebus.State.STOPPED
         halt = shop.wait_for(is_halt, opened)
         shop.wait_for(asks_the_state, halt.at)
@@ -185,7 +185,7 @@ def test_until_it_takes_a_halt_nobody_else_asks_it(shop: Workshop) -> None:
 
 
 def test_others_may_stop_it_meanwhile(shop: Workshop) -> None:
-    with drivebus.Bus(shop.port, parity="N", timeout=0.3) as bus, program(shop, RUNS) as child:
+    with drivebus.Bus(shop.port, parity="N", timeout=1.0) as bus, program(shop, RUNS) as child:
         drive = bus.drive(1, "gd350")
         shop.tell("refuse 06")
         killed = kill(child)
@@ -202,7 +202,7 @@ def test_another_drive_at_the_address_gets_nothing(shop: Workshop) -> None:
     with program(shop, RUNS) as owner:
         kill(owner)
     opened = shop.tell("code 010D")  # a Goodrive10
-    with drivebus.Bus(shop.port, parity="N", timeout=0.3) as bus:
+    with drivebus.Bus(shop.port, parity="N", timeout=1.0) as bus:
         assert bus.read(1, 0x2103) == [0x010D]
         assert any("another drive answers at its address now" in note for note in bus.stats()["wills"])
         shop.wait_for(lambda said: said.kind == "frame" and said.what == QUESTION, opened)
@@ -220,7 +220,7 @@ def test_what_ran_long_ago_is_not_halted_unasked(shop: Workshop) -> None:
     with will.open("r+b") as file:
         file.write(struct.pack("<Q", max(old, 1)))
     opened = time.monotonic()
-    with drivebus.Bus(shop.port, parity="N", timeout=0.3) as bus:
+    with drivebus.Bus(shop.port, parity="N", timeout=1.0) as bus:
         bus.read(1, 0x2100)
         shop.wait_for(asks_the_state, opened)
         assert any("is gone for long" in note for note in bus.stats()["wills"])
@@ -241,7 +241,7 @@ sys.stdin.readline()
 
 
 def test_a_block_that_ended_leaves_nothing(shop: Workshop) -> None:
-    with drivebus.Bus(shop.port, parity="N", timeout=0.3) as bus, program(shop, ENDS) as child:
+    with drivebus.Bus(shop.port, parity="N", timeout=1.0) as bus, program(shop, ENDS) as child:
         assert child.stdin is not None
         assert child.stdout is not None
         assert list(Path(_native.run_time_folder()).glob("*.will"))
@@ -285,7 +285,7 @@ def test_a_guest_that_asks_for_nothing_halts_for_the_owner(shop: Workshop, besid
 KILLS = """
 import os, signal, sys
 import drivebus
-bus = drivebus.Bus(sys.argv[1], parity="N", timeout=0.3)
+bus = drivebus.Bus(sys.argv[1], parity="N", timeout=1.0)
 os.kill(int(sys.argv[2]), signal.SIGKILL)
 print("open", flush=True)
 sys.stdin.readline()
@@ -323,7 +323,7 @@ def test_a_port_of_which_nobody_is_halted_is_not_taken_over_unasked(shop: Worksh
         kill(owner)
         # For longer than it is looked for somebody who is to be halted.
         for _ in range(40):
-            with drivebus.Bus(shop.port, parity="N", timeout=0.3, share="never") as bus:
+            with drivebus.Bus(shop.port, parity="N", timeout=1.0, share="never") as bus:
                 bus.read(1, 0x2100)
 
 
@@ -356,7 +356,7 @@ def test_a_child_that_lives_on_does_not_count_as_its_parent(shop: Workshop) -> N
 
 
 def test_one_that_is_only_stopped_is_not_gone(shop: Workshop) -> None:
-    with drivebus.Bus(shop.port, parity="N", timeout=0.3) as bus, program(shop, RUNS) as child:
+    with drivebus.Bus(shop.port, parity="N", timeout=1.0) as bus, program(shop, RUNS) as child:
         child.send_signal(signal.SIGSTOP)
         os.waitid(os.P_PID, child.pid, os.WSTOPPED | os.WNOWAIT)
         stopped = time.monotonic()
@@ -369,8 +369,8 @@ def test_one_that_is_only_stopped_is_not_gone(shop: Workshop) -> None:
 
 
 def test_a_bus_that_is_closed_while_a_watchdog_is_set_is_halted_for(shop: Workshop) -> None:
-    with drivebus.Bus(shop.port, parity="N", timeout=0.3) as owner:
-        guest = drivebus.Bus(shop.port, parity="N", timeout=0.3)
+    with drivebus.Bus(shop.port, parity="N", timeout=1.0) as owner:
+        guest = drivebus.Bus(shop.port, parity="N", timeout=1.0)
         drive = guest.drive(1, "gd350")
         watchdog = drive.watchdog(5.0, unverified=True)
         drive.run(10.0)

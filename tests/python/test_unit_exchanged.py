@@ -75,7 +75,7 @@ def line(request: pytest.FixtureRequest) -> Iterator[Line]:
         # The one that comes takes its commands from the bus, as in the plant that it comes from.
         with Bus(after.port) as bus, suppress(DrivebusError):
             bus.drive(1, now, unverified=True).prepare_control(store=True)
-        with closing(Cable(before.port, after.port)) as cable, Bus(cable.port, timeout=0.3) as bus:
+        with closing(Cable(before.port, after.port)) as cable, Bus(cable.port, timeout=1.0) as bus:
             drive = bus.drive(1, was, unverified=True)
             with suppress(DrivebusError):
                 drive.prepare_control(store=True)
