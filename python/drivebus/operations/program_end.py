@@ -64,7 +64,7 @@ class Guard:
         self._ended = False
         self._ended_for_others = Latch()
         self._on_its_way = False
-        self._begun = threading.Event()
+        self._begun = Latch()
 
     def arm(self) -> None:
         """From here on it is ended if the program is. In the main thread, signals are listened to as well.
