@@ -63,8 +63,15 @@ const KEPT: usize = 32;
 /// So many open requests of one kind have each its own time; more share that of the latest.
 const APART: usize = 4;
 
-/// More answers than this that could pass for one are waited for, not outvoted.
-const MAX_RIVALS: u8 = 3;
+/// So many answers that could pass for one are always outvoted, and [`MAX_RIVALS`] at most; of more, the end is waited for.
+const MIN_RIVALS: u8 = 3;
+
+/// The same, of short answers.
+const MAX_RIVALS: u8 = 9;
+
+/// Where an answer is to come so often that it has more bytes than this in all, waiting is quicker: on a line that damages them
+/// the long ones seldom come whole.
+const OUTVOTING: usize = 150;
 
 /// How sure the answer to a request can be, before it is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -413,7 +420,7 @@ impl Doubts {
             // What refuses another is told by the master as that.
             Some(_) if !expected.is_read() && words == 1 => Attribution::Certain,
             Some(latest) if !expected.is_read() => Attribution::Wait(latest),
-            Some(latest) if words > 1 + MAX_RIVALS => {
+            Some(latest) if words > 1 + most_rivals(expected) => {
                 Attribution::Wait(self.none_come_again(now, unit, expected).unwrap_or(latest))
             }
             Some(_) => Attribution::Repeat { words, refusal },
@@ -426,7 +433,7 @@ impl Doubts {
         let rivals = || self.of(unit).filter(|open| !open.is_past(now) && self.could_pass(open, expected));
         let others = rivals().filter(|open| !open.again).fold(0_u8, |count, open| count.saturating_add(open.count));
         let ends = rivals().filter(|open| open.again).map(|open| open.last + open.window);
-        ends.max().filter(|_| others <= MAX_RIVALS)
+        ends.max().filter(|_| others <= most_rivals(expected))
     }
 
     /// Until when it is worth to wait whether an answer that `unit` owes is seen, before it is asked for `expected`: a little while,
@@ -508,6 +515,12 @@ impl Doubts {
             self.listed.remove(unit);
         }
     }
+}
+
+/// How many answers that could pass for that to `expected` are outvoted.
+fn most_rivals(expected: Expected) -> u8 {
+    let times = expected.adu_len().and_then(|len| OUTVOTING.checked_div(len)).unwrap_or(0);
+    u8::try_from(times.saturating_sub(1)).unwrap_or(MAX_RIVALS).clamp(MIN_RIVALS, MAX_RIVALS)
 }
 
 /// When, `now` or before, an answer counts as open that was given up at `given_up`, or displaced one that was.

@@ -93,7 +93,7 @@ fn a_refusal_has_to_come_as_often_where_one_is_owed() {
 fn so_many_rivals_that_nothing_outvotes_them_are_waited_for_off_the_line() {
     let mut rig = Rig::settled();
     rig.most = 1;
-    for _ in 0..4 {
+    for _ in 0..10 {
         rig.is_silent_on(ask(7, 1).in_doubt(true));
     }
     let told = rig.run(ask(9, 1));

@@ -70,17 +70,21 @@ fn only_words_that_have_to_come_again_may_be_mistaken() {
     assert!(Attribution::Wait(Instant::ZERO).may_be_mistaken());
 }
 
-/// One more than are open; where that would be more than four times, the wait is shorter.
+/// One more than are open; where the answers would have more than 150 bytes in all, or come more than ten times, the wait is
+/// shorter. Four times are never too many.
 #[test]
-fn a_read_is_repeated_once_for_each_open_answer_and_waits_for_more_than_three() {
-    let mut asker = Asker::new();
-    for open in 1..=6_u8 {
-        let now = u64::from(open) * 100;
-        asker.leaves_open(now, unit(1), &read(1));
-        let expected = if open <= 3 { repeat(open + 1, open + 1) } else { Attribution::Wait(ms(now) + OVERTAKING) };
-        assert_eq!(asker.attribution(ms(now), &read(1)), expected, "{open} are open");
-        let apart = repeat(1, open + 1);
-        assert_eq!(asker.attribution(ms(now), &read(2)), apart, "{open} of another length are open");
+fn a_read_is_repeated_once_for_each_open_answer_and_waits_where_these_are_too_many() {
+    for (words, most) in [(1, 9), (4, 9), (5, 9), (6, 7), (8, 6), (10, 5), (12, 4), (13, 3), (16, 3), (125, 3)] {
+        let mut asker = Asker::new();
+        for open in 1..=12_u8 {
+            let now = u64::from(open) * 100;
+            asker.leaves_open(now, unit(1), &read(words));
+            let sure = repeat(open + 1, open + 1);
+            let expected = if open <= most { sure } else { Attribution::Wait(ms(now) + OVERTAKING) };
+            assert_eq!(asker.attribution(ms(now), &read(words)), expected, "{open} of {words} words are open");
+            let apart = repeat(1, open + 1);
+            assert_eq!(asker.attribution(ms(now), &read(words - 1 + 2 * u16::from(words == 1))), apart);
+        }
     }
 }
 
