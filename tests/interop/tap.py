@@ -13,6 +13,7 @@ import tty
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import pairwise
 from time import monotonic
 
 from drivebus import Exchange, crc16
@@ -183,6 +184,11 @@ class Tap:
 
     def _hits(self) -> bool:
         return self._chance.random() < self.rate
+
+    @property
+    def repeated(self) -> int:
+        """Requests that were put again before they were answered: whose the answer is then, nobody there tells."""
+        return sum(one.answer is None and one.request == again.request for one, again in pairwise(self.asked))
 
     def score(self, heard: Iterable[Exchange]) -> tuple[int, int, int]:
         """Intact exchanges, those of them that *heard* has, and pairs that *heard* has and that are none."""

@@ -1,4 +1,4 @@
-"""Other people's masters talk to other people's units, and drivebus listens: no pair is wrong, nearly all are there.
+"""Other people's masters talk to other people's units, and drivebus listens: every exchange that went well is paired.
 
 The ear gets the bytes in lumps, as adapters hand them over. How it fares on long and hostile lines,
 tools/measure_sniffing.py measures.
@@ -40,15 +40,6 @@ def ear(tap: Tap) -> Iterator[list[Exchange]]:
     thread.join()
 
 
-def assert_all_but_a_few(intact: int, paired: int, wrong: int) -> None:
-    """No pair is wrong, and who has its answer later than units answer, because the machine stood still, is left alone.
-
-    That of intact exchanges none is left alone, crates/rtu/tests/frames/sniffer.rs holds in a time of its own.
-    """
-    assert wrong == 0
-    assert paired >= 0.95 * intact, (intact, paired)
-
-
 @pytest.mark.parametrize("lump", LUMPS)
 def test_pymodbus_to_pymodbus(lump: float, serve: Callable[..., str]) -> None:
     with tapped(lump) as tap:
@@ -56,9 +47,10 @@ def test_pymodbus_to_pymodbus(lump: float, serve: Callable[..., str]) -> None:
         with ear(tap) as heard:
             ask_by_pymodbus(tap.master, COUNT)
         intact, paired, wrong = tap.score(heard)
-    # On a busy machine it asks some of them again.
+    # On a busy machine it asks some of them again; of these alone may some be left without a pair.
     assert intact >= COUNT
-    assert_all_but_a_few(intact, paired, wrong)
+    assert intact - tap.repeated <= paired <= intact
+    assert wrong == 0
     read = next(each for each in heard if each.function == 3 and each.unit == 1)
     assert read.values == {address: address for address in read.values}, "register a holds a"
 
@@ -69,9 +61,7 @@ def test_libmodbus_to_libmodbus(lump: float, serve: Callable[..., str], libmodbu
         serve("libmodbus_server", tap.unit, libmodbus)
         with ear(tap) as heard:
             ask_by_libmodbus(tap.master, COUNT, libmodbus)
-        intact, paired, wrong = tap.score(heard)
-    assert intact == COUNT
-    assert_all_but_a_few(intact, paired, wrong)
+        assert tap.score(heard) == (COUNT, COUNT, 0)
 
 
 def test_mbpoll_to_a_simulated_drive(mbpoll: Callable[..., subprocess.CompletedProcess[str]]) -> None:
