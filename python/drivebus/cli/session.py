@@ -306,13 +306,14 @@ class Session:
             words.append(f"--profile {shlex.quote(self.profile)}")
         return " ".join([*words, name])
 
+    def setting_words(self) -> list[str]:
+        """The options for speed and characters, where they are not as usual."""
+        words = [] if self.baud == DEFAULT_BAUD else [f"--baud {self.baud}"]
+        return words if self.line_format == DEFAULT_FORMAT else [*words, f"--format {''.join(self.line_format)}"]
+
     def _line_words(self) -> list[str]:
         """The options for the line and the unit, where they are not as usual."""
-        words = ["--port", shlex.quote(str(self.port))]
-        if self.baud != DEFAULT_BAUD:
-            words.append(f"--baud {self.baud}")
-        if self.line_format != DEFAULT_FORMAT:
-            words.append(f"--format {''.join(self.line_format)}")
+        words = ["--port", shlex.quote(str(self.port)), *self.setting_words()]
         if self.unit != 1:
             words.append(f"--unit {self.unit}")
         if self.reserved:
@@ -324,10 +325,7 @@ class Session:
         words = ["drivebus", "doctor", shlex.quote(str(self.port))]
         if unit is not None:
             words.append(f"--unit {unit}")
-        if self.baud != DEFAULT_BAUD:
-            words.append(f"--baud {self.baud}")
-        if self.line_format != DEFAULT_FORMAT:
-            words.append(f"--format {''.join(self.line_format)}")
+        words += self.setting_words()
         if self.reserved:
             words.append("--reserved")
         return " ".join(words)

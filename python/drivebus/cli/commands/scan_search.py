@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from contextlib import nullcontext
+from dataclasses import replace
 
 import click
 from rich.console import Console
@@ -12,7 +14,7 @@ from rich.progress import Progress as Bar
 import drivebus
 from drivebus.cli.present.found_units import LocatedUnits
 from drivebus.cli.present.output import remark
-from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session
+from drivebus.cli.session import Session
 
 __all__ = ["search"]
 
@@ -23,7 +25,7 @@ def search(session: Session, timeout: float | None, full: bool) -> None:
     bits, parity, stop = session.line_format
     port = session.one_port()
     bar = _Countdown(out.console) if out.live else None
-    found = LocatedUnits(out, port, (DEFAULT_BAUD, "".join(DEFAULT_FORMAT)))
+    found = LocatedUnits(out, functools.partial(_how, session))
     with drivebus.search(
         port,
         baudrate=session.baud,
@@ -53,6 +55,21 @@ def search(session: Session, timeout: float | None, full: bool) -> None:
         f"on a board, wired to a bare transceiver, needs --rs485. `{session.doctor()}` looks at adapter and line."
     )
     raise click.exceptions.Exit(3)
+
+
+def _how(session: Session, located: drivebus.Located, family: str | None) -> str:
+    """What to type to talk to *located*, as *family* if it has to be named."""
+    settings = located.settings
+    one = replace(
+        session,
+        name="",
+        baud=settings.baudrate,
+        line_format=(str(settings.bytesize), settings.parity, str(settings.stopbits)),
+        unit=located.unit,
+        profile=family,
+        reserved=False,
+    )
+    return one.command("info")
 
 
 class _Countdown(Bar):

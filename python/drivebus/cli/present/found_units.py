@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,14 +50,12 @@ class LocatedUnits:
 
     Args:
         out: Where they go.
-        port: Where they were found.
-        usual: The baud rate and the format that need not be typed.
+        how: What to type to talk to one of them, which has to be named if a family is given.
     """
 
-    def __init__(self, out: Output, port: str, usual: tuple[int, str]) -> None:
+    def __init__(self, out: Output, how: Callable[[drivebus.Located, str | None], str]) -> None:
         self._out = out
-        self._port = port
-        self._usual = usual
+        self._how = how
         self._found: list[drivebus.Located] = []
 
     def __len__(self) -> int:
@@ -93,26 +90,11 @@ class LocatedUnits:
             if any(located.certainty == certainty for located in self._found):
                 say(f"{certainty}: {meaning}")
         known = [each for each in self._found if each.protocol == "modbus"]
-        talk = f" Talk to the first: {self._how(known[0])}" if known else ""
+        talk = f" Talk to the first: `{self._how(known[0], _to_be_named(known[0]))}`" if known else ""
         say(f"{counted(len(self._found), 'unit')}.{talk}")
         for located in known[1:]:
-            if _to_be_named(located) is not None:
-                say(f"Unit {located.unit} has to be named: {self._how(located)}")
-
-    def _how(self, located: drivebus.Located) -> str:
-        """What to type to talk to *located*."""
-        baudrate, line_format = self._usual
-        words = ["--port", shlex.quote(self._port)]
-        if located.settings.baudrate != baudrate:
-            words += ["--baud", str(located.settings.baudrate)]
-        if located.settings.format != line_format:
-            words += ["--format", located.settings.format]
-        if located.unit != 1:
-            words += ["--unit", str(located.unit)]
-        family = _to_be_named(located)
-        if family is not None:
-            words += ["--profile", family]
-        return f"`drivebus {' '.join(words)} info`"
+            if (family := _to_be_named(located)) is not None:
+                say(f"Unit {located.unit} has to be named: `{self._how(located, family)}`")
 
 
 def _family(located: drivebus.Located) -> str:

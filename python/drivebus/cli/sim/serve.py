@@ -17,7 +17,7 @@ from drivebus.cli.names import complete_units
 from drivebus.cli.option_types import Place, Whole
 from drivebus.cli.present.help_format import Listing
 from drivebus.cli.present.output import Output, remark
-from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, pass_session
+from drivebus.cli.session import Session, pass_session
 from drivebus.cli.sim.control_commands import Orders, in_words
 from drivebus.cli.sim.control_socket import open_to_orders
 from drivebus.cli.sim.rates import rates_of
@@ -135,7 +135,9 @@ def sim(
             with ExitStack() as open_things:
                 _take_orders(open_things, orders)
                 # Whoever reads the port may end it at once.
-                session.out.render(_Served(simulator, opened(), heard_at, _line_words(session)))
+                session.out.render(
+                    _Served(simulator, opened(), heard_at, "".join(f" {word}" for word in session.setting_words()))
+                )
                 Latch().wait()
         except KeyboardInterrupt:
             session.out.say("")
@@ -157,7 +159,7 @@ class _Served:
         simulator: That.
         opened: What other programs open.
         ear: What they open to listen; None for nothing.
-        line_words: The options for the line, as they are typed.
+        line_words: The options for the line, as they are typed behind `drivebus`.
     """
 
     simulator: drivebus.Simulator
@@ -203,15 +205,6 @@ class _Served:
             out.say(f"Hear it: `drivebus{self.line_words} sniff {shlex.quote(ear)}`")
         out.say("Trip, load, unplug: `drivebus sim ctl --help`")
         out.say("Ctrl-C ends it.")
-
-
-def _line_words(session: Session) -> str:
-    """The options for the line that are not as usual, as they are typed."""
-    settings = [
-        ("baud", session.baud, DEFAULT_BAUD),
-        ("format", "".join(session.line_format), "".join(DEFAULT_FORMAT)),
-    ]
-    return "".join(f" --{name} {value}" for name, value, usual in settings if value != usual)
 
 
 def _simulated(text: str) -> dict[int, str]:
