@@ -500,8 +500,8 @@ BREAKS = [
     Break(
         "a damaged answer may have been another's",
         JUDGE,
-        "Open::No => self.takes(now, unit, expected, timeout, false),",
-        "Open::No => {}",
+        "self.doubts.none_came_again(unit);\n                self.takes(now, unit, expected, timeout, false);",
+        "self.doubts.none_came_again(unit);",
         "damaged-once --lingers 1",
         beside=(TORN, *BELIEVED),
     ),
@@ -523,15 +523,15 @@ BREAKS = [
     Break(
         "answers have to be the same",
         AGREEMENT,
-        "if came == self.last { self.heard.saturating_add(1) } else { 1 };",
-        "self.heard.saturating_add(1);",
+        "self.latest = Heard { frame: came, times: 0 };",
+        "self.latest.frame = came;",
         "overtaking-one --changes 1",
     ),
     Break(
         "as often as it takes",
         AGREEMENT,
-        "self.heard >= needed",
-        "self.heard >= needed.min(1)",
+        "self.latest.times >= needed",
+        "self.latest.times >= needed.min(1)",
         "overtaking-one",
     ),
     # --- the conversation

@@ -71,7 +71,7 @@ const MAX_RIVALS: u8 = 9;
 
 /// Where an answer is to come so often that it has more bytes than this in all, waiting is quicker: on a line that damages them
 /// the long ones seldom come whole.
-const OUTVOTING: usize = 150;
+const OUTVOTING: usize = 400;
 
 /// How sure the answer to a request can be, before it is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,7 +79,7 @@ const OUTVOTING: usize = 150;
 pub enum Attribution {
     /// What the master takes for the answer is the answer.
     Certain,
-    /// Open answers could pass for it: a read has to bring the same words `words` times in a row, or the same refusal
+    /// Open answers could pass for it: a read has to bring the same words `words` times, or the same refusal
     /// `refusal` times, so that at least one of them is the answer. A read of another length may need less.
     Repeat {
         /// Times for the words read; 1 where no open answer could pass for them.
@@ -186,6 +186,12 @@ impl Doubts {
     /// not.
     pub(crate) fn may_come_again(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration) {
         self.enter(now, (unit, expected, true), window, now);
+    }
+
+    /// The line has shown that what came damaged does not come again: nor did what came so before of `unit`, in the place of
+    /// another answer.
+    pub(crate) fn none_came_again(&mut self, unit: UnitAddress) {
+        self.forget(unit, |open| open.again);
     }
 
     /// What is open: of whom, what, and whether it came damaged before. `since`: when the answer was given up that started it.
@@ -295,10 +301,11 @@ impl Doubts {
     pub(crate) fn seen(&mut self, now: Instant, frame: &Frame<'_>, at_once: Duration) -> bool {
         let is_new = self.hear(now, frame, at_once);
         let Some(unit) = UnitAddress::of_answer(frame.address()) else { return false };
+        let fits = |open: &Open| open.expected.judge_frame(unit, frame).is_ok();
         if !is_new {
+            self.may_be_late(now, unit, fits);
             return false;
         }
-        let fits = |open: &Open| open.expected.judge_frame(unit, frame).is_ok();
         let is_nobodys = !self.has_forgotten(now, unit) && !self.of(unit).any(fits);
         if self.is_strange(now, unit) {
             return is_nobodys;
@@ -313,6 +320,15 @@ impl Doubts {
         };
         self.closes(now, answers, |open| !open.expected.may_repeat_request(), false);
         is_nobodys
+    }
+
+    /// What came at `now` is the frame before it once more, or an answer that is open and `fits`: how late that was is learned, as
+    /// it proves nothing.
+    fn may_be_late(&mut self, now: Instant, unit: UnitAddress, fits: impl Fn(&Open) -> bool) {
+        let open = self.possible(now, unit).filter(|open| !open.again && fits(open));
+        if let Some(given_up) = open.map(|open| open.given_up).max() {
+            self.lateness.came(now, unit, given_up);
+        }
     }
 
     /// At `now` it is known by other means that `unit` owes no answer to `expected`.
@@ -405,17 +421,16 @@ impl Doubts {
         if self.has_forgotten(now, unit) {
             return Attribution::Wait(self.forgotten_until);
         }
-        let (mut words, mut refusal, mut latest) = (1_u8, 1_u8, None);
+        let (mut words, mut refusal) = (1_u8, 1_u8);
         for open in self.of(unit).filter(|open| !open.is_past(now)) {
             if self.could_pass(open, expected) {
                 words = words.saturating_add(open.count);
             }
             if open.expected.function() == expected.function() {
                 refusal = refusal.saturating_add(open.count);
-                latest = latest.max(Some(open.last + open.window));
             }
         }
-        match latest {
+        match self.rivals_end(now, unit, expected) {
             None => Attribution::Certain,
             // What refuses another is told by the master as that.
             Some(_) if !expected.is_read() && words == 1 => Attribution::Certain,
@@ -425,6 +440,12 @@ impl Doubts {
             }
             Some(_) => Attribution::Repeat { words, refusal },
         }
+    }
+
+    /// When the last is past, as far as is known at `now`, of what could pass for the answer of `unit` to `expected`, or refuse it.
+    pub(crate) fn rivals_end(&self, now: Instant, unit: UnitAddress, expected: Expected) -> Option<Instant> {
+        let rivals = self.of(unit).filter(|open| !open.is_past(now) && open.expected.function() == expected.function());
+        rivals.map(|open| open.last + open.window).max()
     }
 
     /// When no answer that came damaged may come again and pass for that of `unit` to `expected`, if those that are left then can
@@ -448,10 +469,11 @@ impl Doubts {
         otherwise: bool,
     ) -> Option<Instant> {
         let is_open = |open: &&Open| !open.expected.is_echo() && !open.is_past(now);
+        let count = self.of(unit).filter(is_open).count();
         let until = self.of(unit).filter(is_open).map(|open| {
             let worth = match expected.is_read() && self.could_pass(open, expected) {
                 true if open.again => open.last + open.window,
-                true => open.given_up + self.lateness.worth(unit, timeout, otherwise),
+                true => open.given_up + self.lateness.worth(unit, timeout, otherwise, count),
                 false => Instant::ZERO,
             };
             open.follows.map_or(worth, |follows| follows.max(worth))

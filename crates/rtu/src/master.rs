@@ -428,6 +428,11 @@ impl Master {
         self.doubts.attribution(now, unit, expected)
     }
 
+    /// When nothing can come any more, as far as is known at `now`, that could pass for the answer of `unit` to `request`.
+    pub(crate) fn rivals_end(&self, now: Instant, unit: UnitAddress, request: &Request<'_>) -> Option<Instant> {
+        self.doubts.rivals_end(now, unit, request.expected())
+    }
+
     /// Until when it is worth to wait whether what `unit` owes is seen, before it is asked `request`, if not `otherwise`;
     /// `None` where nothing is soon to come.
     pub(crate) fn worth_watching(

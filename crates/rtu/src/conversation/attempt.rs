@@ -53,7 +53,9 @@ impl<'r> Conversation<'r> {
         let waits = !is_stop && in_time && self.course.may_watch();
         if !self.course.sends() {
             let result = match &self.course.hearing {
-                Some(Hearing { asked, .. }) if self.attempt.tried.failure.is_none() => {
+                Some(Hearing { asked, agreement, .. })
+                    if self.attempt.tried.failure.is_none() && agreement.was_contradicted() =>
+                {
                     let why = Unanswered::Disagreeing { asked: *asked };
                     Err(self.slip(why, None, now))
                 }

@@ -367,13 +367,13 @@ impl<'r> Conversation<'r> {
         };
         let Hearing { agreement, asked, known: then } = hearing;
         *then = Some(known.asked(unit));
-        let (is_last, asked) = (*asked >= u32::from(agreement.longest()), *asked);
+        let asked = *asked;
         let (sent, ended) = match result {
             Ok(times) => {
                 if self.answer.answer().is_some_and(|answer| agreement.hear(unit, &answer)) {
                     return self.end_attempt(now, known, result);
                 }
-                if !is_last {
+                if !agreement.is_in_vain() {
                     // What this call left open before may still come; it is an answer like this one.
                     self.course.repeats(again, known.asked(unit));
                     self.state = State::Passing;
@@ -391,7 +391,7 @@ impl<'r> Conversation<'r> {
                 if is_put_off || agreement.hear(unit, &Answer::exception(function, code)) {
                     return self.end_attempt(now, known, result);
                 }
-                if !is_last {
+                if !agreement.is_in_vain() {
                     self.state = State::Passing;
                     return;
                 }
@@ -399,6 +399,11 @@ impl<'r> Conversation<'r> {
             }
         };
         self.course.hearing = None;
+        if known.master.attribution(now, unit, &self.ask().request).may_be_mistaken() {
+            self.attempt.tried.disagreed = true;
+            self.state = State::Passing;
+            return;
+        }
         let slip = self.slip(Unanswered::Disagreeing { asked }, sent, ended);
         self.end_attempt(now, known, Err(slip));
     }

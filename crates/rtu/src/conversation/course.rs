@@ -165,12 +165,13 @@ impl Course {
         self.left_open = asked.filter(|_| failure.is_some_and(Unanswered::is_unanswered)).map(|asked| (asked, form));
     }
 
-    /// The question has to be put `more` times than once to be believed: that may take as many time-outs of `timeout` more, and
-    /// as many failures.
+    /// The question has to be put `more` times than once to be believed: that may take as many time-outs of `timeout` more,
+    /// twice as many failures, and as many requests as it all takes.
     pub(super) fn takes_more(&mut self, more: u32, timeout: Duration) {
         let granted = more.saturating_sub(self.granted);
         self.granted += granted;
-        self.left = self.left.saturating_add(granted.saturating_mul(2));
+        self.left = self.left.saturating_add(granted.saturating_mul(4));
+        self.requests = self.requests.saturating_add(granted.saturating_mul(3));
         let longer = timeout.saturating_mul(granted);
         self.allowed = self.allowed.saturating_add(longer);
         self.until = self.until.map(|until| until + longer);

@@ -306,6 +306,10 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         match attribution {
             Attribution::Wait(until) => Next::Overtaken(until),
             Attribution::Others(_) => Next::OthersAsk,
+            // Its words change: they are sure when there is nothing left to outvote.
+            Attribution::Repeat { .. } if tried.disagreed => {
+                Next::Overtaken(self.master.rivals_end(now, unit, &ask.request).unwrap_or(now))
+            }
             sure @ (Attribution::Certain | Attribution::Repeat { .. }) => Next::Ask(sure),
         }
     }

@@ -45,6 +45,8 @@ pub(super) struct Tried {
     pub(super) looks: u32,
     echoes: u32,
     other_read: bool,
+    /// Whether it was asked until the answers agree, and they did not.
+    pub(super) disagreed: bool,
     /// How the latest probe failed, and the bytes that came.
     pub(super) failure: Option<(Slip, Bytes)>,
 }

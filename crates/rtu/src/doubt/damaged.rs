@@ -17,8 +17,7 @@ impl Doubts {
     ) -> Option<(UnitAddress, Expected)> {
         let still = |open: &&Open| fits(open) && self.may_come(now, open);
         let first = self.ledger.iter().flatten().filter(still).min_by_key(|open| open.last + open.window)?;
-        let (unit, expected, given_up) = (first.unit, first.expected, first.given_up);
-        let (end, count) = (first.last + first.window, first.count);
+        let (unit, expected, end) = (first.unit, first.expected, first.last + first.window);
         let others = self.ledger.iter().flatten().filter(still);
         if !is_it(first) || others.clone().any(|open| (open.unit, open.expected) != (unit, expected)) {
             return None;
@@ -26,7 +25,8 @@ impl Doubts {
         if stays {
             return Some((unit, expected));
         }
-        let is_only = others.count() == 1 && count == 1 && !first.again && now < end;
+        let in_time = others.filter(|open| !open.again && !open.is_past(now));
+        let latest = in_time.map(|open| open.given_up).max();
         let is_first = |open: &Open| fits(open) && (open.unit, open.last + open.window) == (unit, end);
         for place in &mut self.ledger {
             match place {
@@ -36,7 +36,7 @@ impl Doubts {
             }
             break;
         }
-        if is_only {
+        if let Some(given_up) = latest {
             self.lateness.came(now, unit, given_up);
         }
         self.ends_unless_open(now, unit);

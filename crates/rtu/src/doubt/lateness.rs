@@ -10,6 +10,9 @@ use crate::{Instant, UnitAddress};
 /// So many times as long as the latest that was seen it is worth to wait.
 const WORTH: u32 = 2;
 
+/// Of a unit of which no answer was late yet so many open ones are watched for.
+const UNKNOWN: usize = 3;
+
 /// Units that are remembered; of others nothing is known.
 const KEPT: usize = 8;
 
@@ -23,7 +26,7 @@ impl Lateness {
     /// An answer of `unit` came at `now` that was given up at `given_up`. With more units than are kept, the one that was late
     /// longest ago is forgotten.
     pub(super) fn came(&mut self, now: Instant, unit: UnitAddress, given_up: Instant) {
-        let late = self.of(unit).max(now.saturating_duration_since(given_up));
+        let late = self.known(unit).unwrap_or_default().max(now.saturating_duration_since(given_up));
         let is_it = |place: &Option<(UnitAddress, Duration)>| place.is_none_or(|(of, _)| of == unit);
         let place = self.0.iter().position(is_it).unwrap_or(KEPT - 1);
         self.0[place] = Some((unit, late));
@@ -32,8 +35,10 @@ impl Lateness {
 
     /// How long it is worth to wait for an answer of `unit`, from when it was given up, `most` at most. No time at all where none
     /// was late yet, or they take longer; nor, where the unit can be asked `otherwise`, if that may be all of it.
-    pub(super) fn worth(&self, unit: UnitAddress, most: Duration, otherwise: bool) -> Duration {
-        let late = self.of(unit);
+    pub(super) fn worth(&self, unit: UnitAddress, most: Duration, otherwise: bool, open: usize) -> Duration {
+        let Some(late) = self.known(unit) else {
+            return if !otherwise && open <= UNKNOWN { most } else { Duration::ZERO };
+        };
         match late.saturating_mul(WORTH) {
             worth if worth <= most => worth,
             _ if late <= most && !otherwise => most,
@@ -41,7 +46,7 @@ impl Lateness {
         }
     }
 
-    fn of(&self, unit: UnitAddress) -> Duration {
-        self.0.iter().flatten().find(|(of, _)| *of == unit).map_or(Duration::ZERO, |(_, late)| *late)
+    fn known(&self, unit: UnitAddress) -> Option<Duration> {
+        self.0.iter().flatten().find(|(of, _)| *of == unit).map(|(_, late)| *late)
     }
 }

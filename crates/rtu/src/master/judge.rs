@@ -219,7 +219,10 @@ impl Master {
             };
         }
         match self.is_still_open(now, unit, expected, timeout) {
-            Open::No => self.takes(now, unit, expected, timeout, false),
+            Open::No => {
+                self.doubts.none_came_again(unit);
+                self.takes(now, unit, expected, timeout, false);
+            }
             Open::For(time) => self.doubts.may_come_again(now, unit, expected, time.max(timeout)),
             Open::Long => self.doubts.left_open(now, unit, expected, timeout),
         }

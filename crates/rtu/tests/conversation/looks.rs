@@ -75,28 +75,28 @@ fn answers_that_have_to_agree_and_do_not_are_told_when_the_call_may_send_no_more
     }
     let differ = |count: u16| (1..=count).map(|word| Says(words(&[word])));
     let three = rig.known.clone();
-    // An echo, the longer read that is refused, and what is left of seven.
-    rig.next([Right, Refuses(3)].into_iter().chain(differ(9)));
+    // An echo, the longer read that is refused, and what is left of seven and of nine for three answers more.
+    rig.next([Right, Refuses(3)].into_iter().chain(differ(9).flat_map(|says| [Damaged, says])));
     let told = rig.run(ask(9, 1));
-    assert_eq!((told.end, told.sent.len()), (End::Failed(Unanswered::Disagreeing { asked: 5 }), 7));
+    assert_eq!((told.end, told.sent.len()), (End::Failed(Unanswered::Disagreeing { asked: 14 }), 16));
     // Where the unit could not be made sure of any more, that is told.
     rig.known = three;
-    rig.next([Right, Refuses(3)].into_iter().chain(differ(4)).chain([Nothing, Damaged]));
+    rig.next([Right, Refuses(3)].into_iter().chain(differ(4)).chain([Nothing]).chain(vec![Damaged; 9]));
     // Another call asks when four answers have come, and the unit is silent.
     rig.meanwhile = vec![None; 9].into();
     rig.meanwhile.push_back(Some(ask(8, 1).in_doubt(true)));
     let told = rig.run(ask(9, 1));
     assert!(matches!(told.end, End::Failed(Unanswered::Corrupt(_))), "{told:?}");
-    assert_eq!((told.sent.len(), told.sent.last()), (7, Some(&echo())), "{told:02X?}");
+    assert_eq!((told.sent.len(), told.sent.last()), (13, Some(&echo())), "{told:02X?}");
 }
 
 #[test]
-fn for_answers_that_have_to_agree_as_many_failures_more_are_granted_and_no_others() {
+fn for_answers_that_have_to_agree_twice_as_many_failures_are_granted_and_no_others() {
     let mut rig = Rig::settled();
     rig.most = 1;
     rig.is_silent_on(ask(7, 1));
-    rig.next([Right, Refuses(3), Right, Damaged, Damaged, Damaged, Right, Right]);
+    rig.next([Right, Refuses(3), Right, Damaged, Damaged, Damaged, Damaged, Damaged, Right, Right]);
     let told = rig.run(ask(9, 1));
     assert!(matches!(told.end, End::Failed(Unanswered::Corrupt(_))), "{told:?}");
-    assert_eq!(told.sent.len(), 6, "two that came damaged cost the time-out that is granted");
+    assert_eq!(told.sent.len(), 8, "four that came damaged are granted");
 }

@@ -101,6 +101,20 @@ fn so_many_rivals_that_nothing_outvotes_them_are_waited_for_off_the_line() {
     assert_eq!(told.sent.last(), Some(&read(9, 1)));
 }
 
+/// What changes from read to read is never outvoted, and is read all the same.
+#[test]
+fn where_the_words_change_it_is_waited_until_nothing_can_be_late() {
+    let mut rig = owes_one();
+    rig.always.insert(8, Right);
+    rig.next([Refuses(3)].into_iter().chain((20..40).map(|word| Says(words(&[word])))));
+    let told = rig.run(ask(9, 1));
+    let (before, last) = (told.sent_at[told.sent.len() - 2], told.sent_at[told.sent.len() - 1]);
+    assert!(last > before + OVERTAKING, "each of those before may have been the one that was owed: {told:?}");
+    let heard = u16::try_from(told.sent.len()).unwrap() - 2;
+    assert_eq!(told.end, End::Words(vec![20 + heard - 1]), "the last of them is sure");
+    assert!(heard <= 7, "twice as many as may be refusals, and one");
+}
+
 #[test]
 fn what_may_be_late_is_granted_the_time_to_be_outvoted() {
     let mut rig = owes_one();

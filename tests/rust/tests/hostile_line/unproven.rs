@@ -108,7 +108,7 @@ fn a_write_that_is_not_confirmed_and_cannot_be_looked_up_has_no_answer() {
 /// It is the read that decides, so that it waits where an open answer could pass for its own.
 #[test]
 fn what_is_read_back_waits_until_no_earlier_read_can_answer_it() {
-    let words: Vec<u16> = (100..116).collect();
+    let words: Vec<u16> = (100..140).collect();
     let rig = Rig::new(move |_, request| match request {
         [1, 16, ..] | [1, 3, 0x10, ..] => Vec::new(),
         _ => at_once(&right(request)),
@@ -117,14 +117,14 @@ fn what_is_read_back_waits_until_no_earlier_read_can_answer_it() {
     // More than can be outvoted, of a length that no longer form helps.
     let in_doubt = CallOptions::new().in_doubt(true);
     for address in 0x1000..0x1004 {
-        let read = Request::read(address, 16).unwrap();
+        let read = Request::read(address, 40).unwrap();
         rig.call(unit(1).into(), &read, in_doubt, &mut || false, &mut |_| ()).unwrap_err();
     }
     let given_up = rig.now();
     let options = CallOptions::new().read_back(100);
     let write = Request::write_many(100, &words).unwrap();
     rig.call(unit(1).into(), &write, options, &mut || false, &mut |_| ()).unwrap();
-    assert_eq!(rig.sent(&Request::read(100, 16).unwrap()), 1);
+    assert_eq!(rig.sent(&Request::read(100, 40).unwrap()), 1);
     assert!(rig.since(given_up) >= OVERTAKING);
 }
 
