@@ -85,13 +85,12 @@ impl Agreement {
         self.heard = self.heard.saturating_add(1);
         self.in_a_row = if came == self.latest.frame { self.in_a_row.saturating_add(1) } else { 1 };
         if came != self.latest.frame {
-            core::mem::swap(&mut self.latest, &mut self.other);
-        }
-        if came != self.latest.frame {
-            if self.latest.times > self.other.times {
+            if came == self.other.frame || self.latest.times >= self.other.times {
                 core::mem::swap(&mut self.latest, &mut self.other);
             }
-            self.latest = Heard { frame: came, times: 0 };
+            if came != self.latest.frame {
+                self.latest = Heard { frame: came, times: 0 };
+            }
         }
         self.latest.times = self.latest.times.saturating_add(1);
         let (needed, at_least) = match answer {

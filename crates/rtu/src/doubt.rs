@@ -302,8 +302,9 @@ impl Doubts {
         let is_new = self.hear(now, frame, at_once);
         let Some(unit) = UnitAddress::of_answer(frame.address()) else { return false };
         let fits = |open: &Open| open.expected.judge_frame(unit, frame).is_ok();
+        // The frame before it once more, or one that is late.
         if !is_new {
-            self.may_be_late(now, unit, fits);
+            self.learns_lateness(now, unit, fits);
             return false;
         }
         let is_nobodys = !self.has_forgotten(now, unit) && !self.of(unit).any(fits);
@@ -322,9 +323,9 @@ impl Doubts {
         is_nobodys
     }
 
-    /// What came at `now` is the frame before it once more, or an answer that is open and `fits`: how late that was is learned, as
-    /// it proves nothing.
-    fn may_be_late(&mut self, now: Instant, unit: UnitAddress, fits: impl Fn(&Open) -> bool) {
+    /// What came at `now` may be an answer that is open and `fits`: how late that is, the latest of them, is learned. Nothing
+    /// follows from it of what is open.
+    fn learns_lateness(&mut self, now: Instant, unit: UnitAddress, fits: impl Fn(&Open) -> bool) {
         let open = self.possible(now, unit).filter(|open| !open.again && fits(open));
         if let Some(given_up) = open.map(|open| open.given_up).max() {
             self.lateness.came(now, unit, given_up);

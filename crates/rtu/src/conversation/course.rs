@@ -12,8 +12,8 @@ pub(super) type Asked = (u32, u32);
 /// How many more attempts than questions there may be: those that end with a probe.
 const PROBED_IN_VAIN: u32 = 4;
 
-/// Requests that one call may send for each time that it may ask, whatever they are for: the question, what makes sure of the
-/// unit and of the adapter before it, and what is asked again because answers do not agree.
+/// Requests that one call may send for each time that it may ask, whatever they are for: the question, and what makes sure of the
+/// unit and of the adapter before it. Answers that have to agree are granted more: see [`Course::takes_more`].
 pub(super) const REQUESTS: u32 = 8;
 
 /// How a question is put.

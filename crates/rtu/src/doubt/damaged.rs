@@ -18,15 +18,14 @@ impl Doubts {
         let still = |open: &&Open| fits(open) && self.may_come(now, open);
         let first = self.ledger.iter().flatten().filter(still).min_by_key(|open| open.last + open.window)?;
         let (unit, expected, end) = (first.unit, first.expected, first.last + first.window);
-        let others = self.ledger.iter().flatten().filter(still);
-        if !is_it(first) || others.clone().any(|open| (open.unit, open.expected) != (unit, expected)) {
+        let mut others = self.ledger.iter().flatten().filter(still);
+        if !is_it(first) || others.any(|open| (open.unit, open.expected) != (unit, expected)) {
             return None;
         }
         if stays {
             return Some((unit, expected));
         }
-        let in_time = others.filter(|open| !open.again && !open.is_past(now));
-        let latest = in_time.map(|open| open.given_up).max();
+        self.learns_lateness(now, unit, |open| fits(open) && !open.is_past(now));
         let is_first = |open: &Open| fits(open) && (open.unit, open.last + open.window) == (unit, end);
         for place in &mut self.ledger {
             match place {
@@ -35,9 +34,6 @@ impl Doubts {
                 _ => continue,
             }
             break;
-        }
-        if let Some(given_up) = latest {
-            self.lateness.came(now, unit, given_up);
         }
         self.ends_unless_open(now, unit);
         Some((unit, expected))

@@ -33,8 +33,9 @@ impl Lateness {
         self.0[..=place].rotate_right(1);
     }
 
-    /// How long it is worth to wait for an answer of `unit`, from when it was given up, `most` at most. No time at all where none
-    /// was late yet, or they take longer; nor, where the unit can be asked `otherwise`, if that may be all of it.
+    /// How long it is worth to wait for an answer of `unit`, from when it was given up, `most` at most. No time at all where they
+    /// take longer; nor, where the unit can be asked `otherwise`, if that may be all of it. Where none was late yet, all of it as
+    /// long as no more than [`UNKNOWN`] are `open`.
     pub(super) fn worth(&self, unit: UnitAddress, most: Duration, otherwise: bool, open: usize) -> Duration {
         let Some(late) = self.known(unit) else {
             return if !otherwise && open <= UNKNOWN { most } else { Duration::ZERO };

@@ -70,7 +70,11 @@ fn the_longest_sequence_is_one_that_has_as_many_late_answers_as_can_be() {
 proptest! {
     /// What is believed came so often that one of them was no late one, and the words as often in a row as the caller wants.
     #[test]
-    fn what_is_believed_came_often_enough(words in 1..=10_u8, least in 1..=3_u8, came in prop::collection::vec(0..5_u16, 1..60)) {
+    fn what_is_believed_came_often_enough(
+        words in 1..=10_u8,
+        least in 1..=3_u8,
+        came in prop::collection::vec(0..5_u16, 1..60),
+    ) {
         let mut agreement = agreement(words, words, least);
         for (index, word) in came.iter().enumerate() {
             if agreement.hear(unit(1), &Answer::read(&[*word]).unwrap()) {
@@ -83,7 +87,10 @@ proptest! {
 
     /// However late answers of two kinds come between them, words that do not change are believed in the end.
     #[test]
-    fn late_answers_of_two_kinds_hinder_nothing_for_long(words in 1..=10_u8, places in prop::collection::vec((0..30_usize, 0..2_u16), 0..9)) {
+    fn late_answers_of_two_kinds_hinder_nothing_for_long(
+        words in 1..=10_u8,
+        places in prop::collection::vec((0..30_usize, 0..2_u16), 0..9),
+    ) {
         let late = &places[..places.len().min(usize::from(words) - 1)];
         let mut came = vec![7; 30];
         for &(place, word) in late {
