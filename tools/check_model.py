@@ -38,6 +38,7 @@ CONVERSATION = "crates/rtu/src/conversation.rs"
 ATTEMPT = "crates/rtu/src/conversation/attempt.rs"
 CAME_TO = "crates/rtu/src/conversation/came_to.rs"
 FIRST_CONTACT = "crates/rtu/src/conversation/first_contact.rs"
+TWO_PARTS = "crates/rtu/src/conversation/two_parts.rs"
 KNOWN = "crates/rtu/src/conversation/known.rs"
 LONGER = "crates/rtu/src/conversation/longer_reads.rs"
 WRITE_BACK = "crates/rtu/src/conversation/write_back.rs"
@@ -555,6 +556,21 @@ BREAKS = [
         "find(&|read| master.tells_apart(now, unit, read)).or_else",
         "find(&|_| true).or_else",
         "overtaking --requests 4",
+    ),
+    Break(
+        "the first part of a read has a length that nothing open has",
+        TWO_PARTS,
+        "is_apart(first_part(request, first)) && is_apart",
+        "is_apart",
+        "overtaking-sixteen --faults 0 --requests 7",
+    ),
+    Break(
+        "the last part of a read has a length that nothing open has",
+        TWO_PARTS,
+        "&& is_apart(last_part(request, last))",
+        "",
+        "overtaking-sixteen --faults 0 --requests 7",
+        beside=(TWO_PARTS, "known.longer.is_apart(&known.master, now, unit, &request)", "unit >= UnitAddress::MIN"),
     ),
     Break(
         "a write waits until nothing open could confirm it",

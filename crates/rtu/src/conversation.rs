@@ -12,6 +12,7 @@
 //! | `write_back` | a write of words that can be read back |
 //! | `probes` | which request shows that a unit owes nothing |
 //! | `longer_reads` | how many words a read asks for, so that its answer is told apart |
+//! | `two_parts` | the same in two reads, where no longer one helps |
 //! | `among_others` | the same where other masters' answers come, too |
 //! | `first_contact` | a stop's reads on a line that was just opened |
 //! | `adapter`, `echo` | whether the adapter sends our own bytes back |
@@ -35,6 +36,7 @@ mod outcome;
 mod probes;
 mod question;
 mod step;
+mod two_parts;
 mod units;
 mod watched;
 mod write_back;

@@ -43,6 +43,14 @@ impl Kind {
         self.request_at(STATE)
     }
 
+    /// From where it reads what a program asks for, where it is a read.
+    pub fn first_place(self) -> u16 {
+        match self.request() {
+            Request::Read { address, .. } => address,
+            _ => 0,
+        }
+    }
+
     /// The same, where it is a read, from `place` on.
     pub fn request_at(self, place: u16) -> Request<'static> {
         match self {

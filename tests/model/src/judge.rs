@@ -130,9 +130,17 @@ impl State {
         let is_asked =
             !refused || matches!(came.content, Content::Refused(kind) if kind.request() == call.kind.request());
         let is_own = is_asked && came.is_since(call.first) && came.place == flight.place && !came.is_other_length;
-        let before = call.truth.row.filter(|(content, ..)| alike(*content, came.content));
-        let (times, was_own) = before.map_or((0, false), |(_, times, own)| (times, own));
-        call.truth.row = Some((came.content, times + 1, is_own || was_own));
+        // The last words of what was asked in two parts: both have to be its own.
+        let is_last_part = flight.place != flight.kind.first_place() && !refused;
+        call.truth.row = if is_last_part {
+            let is_all_own = is_own && call.truth.row.is_some_and(|(.., own)| own);
+            step.sights.push(Sight::InTwo);
+            Some((came.content, 1, is_all_own))
+        } else {
+            let before = call.truth.row.filter(|(content, ..)| alike(*content, came.content));
+            let (times, was_own) = before.map_or((0, false), |(_, times, own)| (times, own));
+            Some((came.content, times + 1, is_own || was_own))
+        };
         if flight.ends_doubt && !refused {
             if self.is_doubted(call.unit) {
                 self.wrong = Some(Wrong::Unended);

@@ -135,6 +135,8 @@ pub enum Sight {
     AdapterFound,
     /// An answer of another length than was asked for was told as wrong.
     OtherLength,
+    /// A read was answered in two parts.
+    InTwo,
 }
 
 /// A line, what happens on it, and how far it is searched.
@@ -298,6 +300,16 @@ pub const SCENARIOS: &[Scenario] = &[
         small: Budget { retries: 0, ..Budget::requests(5) },
         deep: Budget { faults: 1, retries: 0, ..Budget::requests(5) },
         sights: &[Sight::ReadAtOnce, Sight::Agreed, Sight::Late, Sight::EndedByEcho],
+        ..LINE
+    },
+    Scenario {
+        name: "overtaking-sixteen",
+        about: "the same, and as many words are read as a unit gives at once: it is asked for them in two parts",
+        overtaking: true,
+        kinds: &[Kind::Read(16)],
+        small: Budget { retries: 0, ..Budget::requests(5) },
+        deep: Budget { faults: 1, retries: 0, ..Budget::requests(6) },
+        sights: &[Sight::ReadAtOnce, Sight::InTwo, Sight::Late, Sight::EndedByEcho],
         ..LINE
     },
     Scenario {

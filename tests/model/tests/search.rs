@@ -33,6 +33,7 @@ lines! {
     silent_on_echoes: "silent-on-08H",
     overtaking: "overtaking",
     overtaking_one_word_at_a_time: "overtaking-one",
+    overtaking_in_two_parts: "overtaking-sixteen",
     overtaking_commands: "overtaking-commands",
     overtaking_without_echo: "overtaking-no-echo",
     overtaking_with_other_lengths: "other-lengths",

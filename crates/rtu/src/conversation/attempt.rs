@@ -7,6 +7,7 @@ use super::first_contact::Put;
 use super::known::{Ask, Known, Next};
 use super::outcome::{Slip, Unanswered};
 use super::probes::{Probe, Tried};
+use super::two_parts::Begun;
 use super::{Conversation, State, Urgency};
 use crate::{Agreement, Attribution, Instant, Request, Table};
 
@@ -20,13 +21,17 @@ pub(super) struct Attempt {
     asks: bool,
     /// How often it was asked before.
     pub(super) asked_before: u32,
+    /// The first part of the question, where that has come alone.
+    pub(super) begun: Option<Begun>,
+    /// How often its two parts did not fit.
+    pub(super) changes: u8,
 }
 
 impl Attempt {
     /// One of a question that was asked so often before.
     pub(super) fn new(verify: bool, asked_before: u32) -> Self {
         // Whatever else is repeated would be done twice, and what is verified is asked as it is.
-        Self { tried: Tried::default(), apart: !verify, asks: true, asked_before }
+        Self { tried: Tried::default(), apart: !verify, asks: true, asked_before, begun: None, changes: 0 }
     }
 }
 
@@ -88,10 +93,16 @@ impl<'r> Conversation<'r> {
             self.ask_at_first_contact(now, known, ask, put);
             return;
         }
+        if let Some(begun) = self.attempt.begun.take()
+            && self.asks_last_part(now, known, &ask, begun)
+        {
+            return;
+        }
         let can_look_up = self.write.as_ref().is_some_and(|write| !write.is_reading());
         match known.next(now, &ask, self.words, &self.attempt.tried, (in_time, waits), self.attempt.apart) {
             Next::Ask(attribution) => self.ask_sure(now, known, ask, attribution, false),
             Next::AskApart(count) => self.ask_apart(now, known, ask, count, false),
+            Next::AskInTwo(first, last) => self.ask_first_part(now, known, ask, (first, last)),
             Next::OthersAsk => {
                 let slip = self.slip(Unanswered::OthersAsk, None, now);
                 self.end_attempt(now, known, Err(slip));
@@ -140,7 +151,7 @@ impl<'r> Conversation<'r> {
     }
 
     /// The question goes out, and that counts.
-    fn put<const U: usize, const P: usize>(
+    pub(super) fn put<const U: usize, const P: usize>(
         &mut self,
         now: Instant,
         known: &mut Known<U, P>,

@@ -49,6 +49,8 @@ impl<'r> Conversation<'r> {
                     result => self.apart_came_to(now, known, &flight.ask, count, result),
                 }
             }
+            Purpose::First { last } => self.first_part_came_to(now, known, &flight.ask, last, result),
+            Purpose::Last { sent } => self.last_part_came_to(now, known, &flight.ask, sent, result),
             Purpose::Proof { of, count, times } => {
                 self.proof_came_to(now, known, &flight.ask, (of, count, times), result);
             }
@@ -280,7 +282,7 @@ impl<'r> Conversation<'r> {
     }
 
     /// The question as `ask` puts it, or what proves its answer, ended so.
-    fn apart_ended<const U: usize, const P: usize>(
+    pub(super) fn apart_ended<const U: usize, const P: usize>(
         &mut self,
         now: Instant,
         known: &mut Known<U, P>,

@@ -22,6 +22,10 @@ pub(super) enum Purpose<'r> {
     Untold,
     /// The question as a read of so many words.
     Apart { count: u16, is_unproven: bool },
+    /// The first words of the question, of which the last `last` follow.
+    First { last: u16 },
+    /// The last words of the question, the first of which were asked for then.
+    Last { sent: Instant },
     /// Behind the answer to `of`, the question as a read of `count` words, which came at these times: a read of another length.
     Proof { of: Request<'r>, count: u16, times: Times },
     /// The question at first contact.
@@ -133,6 +137,7 @@ impl<'r> Conversation<'r> {
             Request::Read { count, .. } => count,
             _ => u16::MAX,
         };
+        let whole = self.ask().request.expected();
         let State::InFlight(flight) = &mut self.state else { return Polled::Over };
         if !flight.is_begun_last(known) {
             let slip = Slip { why: Unanswered::Misused, sent: flight.sent, ended: now };
@@ -174,7 +179,9 @@ impl<'r> Conversation<'r> {
                 })
             }
             Some(Event::Answer(answer)) => {
-                if flight.purpose.keeps_the_answer() {
+                if let (Purpose::Last { .. }, Answer::Read { words, .. }) = (flight.purpose, &answer) {
+                    self.answer.goes_on_with(whole, *words);
+                } else if flight.purpose.keeps_the_answer() {
                     self.answer.set(expected, &answer, asked);
                 }
                 None

@@ -7,6 +7,7 @@ use super::first_contact::Put;
 use super::fresh_words::FreshWords;
 use super::longer_reads::Longer;
 use super::probes::{Probe, Tried};
+use super::two_parts;
 use super::units::Units;
 use crate::{Attribution, Destination, Instant, Master, Patience, Request, SerialFormat, Table, Tally, UnitAddress};
 
@@ -29,6 +30,8 @@ pub(super) enum Next {
     AskUntold,
     /// Send it as a read of so many words, which nothing that the unit owes could pass for.
     AskApart(u16),
+    /// Send it as two reads of so many words, which have one in common: nothing that the unit owes could pass for either.
+    AskInTwo(u16, u16),
     /// See whether the adapter echoes.
     LookForEcho,
     /// Make sure that the unit owes nothing else.
@@ -278,11 +281,19 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         {
             return Next::AskApart(count);
         }
+        let in_two = if apart && may_be_mistaken && !self.others {
+            two_parts::parts(&self.longer, &self.master, now, unit, &ask.request)
+        } else {
+            None
+        };
         if waits
             && (in_quarantine || attribution.may_be_mistaken())
             && let Some(until) = self.watches(now, unit, ask, apart)
         {
             return Next::Watch(until);
+        }
+        if let Some((first, last)) = in_two {
+            return Next::AskInTwo(first, last);
         }
         if self.echo == OwnEcho::Unknown && (ask.request.expected().may_repeat_request() || in_quarantine) {
             return Next::LookForEcho;

@@ -65,10 +65,19 @@ impl<const N: usize> Longer<N> {
             self.lengths(unit, request).find(|(_, read)| tells_apart(read)).map(|(words, _)| words)
         };
         // More words than anything open has, so that not even an answer that is cut short could pass; else another number.
-        find(&|read| master.tells_apart(now, unit, read)).or_else(|| {
-            let is_sure = |read: &Request<'_>| !master.attribution(now, unit, read).may_be_mistaken();
-            find(&is_sure).filter(|_| !master.in_quarantine(now, unit))
-        })
+        find(&|read| master.tells_apart(now, unit, read))
+            .or_else(|| find(&|read| has_another_length(master, now, unit, read)))
+    }
+
+    /// Whether the answer of `unit` to `read` as it is can be no other's.
+    pub(super) fn is_apart(&self, master: &Master, now: Instant, unit: UnitAddress, read: &Request<'_>) -> bool {
+        let is_given = match *read {
+            Request::Read { table, address, count, .. } => {
+                self.get(unit, (table, address)).is_none_or(|limit| count < limit.refused)
+            }
+            _ => false,
+        };
+        is_given && (master.tells_apart(now, unit, read) || has_another_length(master, now, unit, read))
     }
 
     /// The reads of so many words as `request` asks for, and of more, that `unit` was not heard to refuse.
@@ -138,6 +147,11 @@ impl<const N: usize> Longer<N> {
             *kept = Some(((unit, place), limit));
         }
     }
+}
+
+/// Whether `read` asks for another number of words than everything open has, of a unit that answers in order.
+fn has_another_length(master: &Master, now: Instant, unit: UnitAddress, read: &Request<'_>) -> bool {
+    !master.in_quarantine(now, unit) && !master.attribution(now, unit, read).may_be_mistaken()
 }
 
 #[cfg(test)]

@@ -246,6 +246,21 @@ impl Kept {
         (self.expected, self.asked) = (Some(expected), asked);
     }
 
+    /// Puts `words`, the first of which is the last that it has, behind its own: then it is the answer to `whole`. Where that
+    /// word is another one, there is no answer.
+    pub(super) fn goes_on_with(&mut self, whole: Expected, words: Words<'_>) {
+        let own = self.expected.take().and_then(|expected| expected.parse(&self.pdu[..self.len]).ok());
+        let mut all = [0; MAX_PDU / 2];
+        let Some(Answer::Read { table, words: first }) = own else { return };
+        let fits = !first.is_empty() && first.get(first.len() - 1) == words.get(0);
+        let joined = first.iter().chain(words.iter().skip(1));
+        let count = all.iter_mut().zip(joined).map(|(place, word)| *place = word).count();
+        if fits && let Ok(answer) = Answer::read_of(table, &all[..count]) {
+            self.len = answer.put(&mut self.pdu);
+            self.expected = Some(whole);
+        }
+    }
+
     pub(super) fn clear(&mut self) {
         self.expected = None;
     }

@@ -16,6 +16,7 @@ mod port;
 mod probes;
 mod retries;
 mod rig;
+mod two_parts;
 mod verified;
 mod watching;
 mod write_back;

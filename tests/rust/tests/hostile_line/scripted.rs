@@ -261,6 +261,11 @@ impl Rig {
         wire.now = wire.now + time;
     }
 
+    /// What was sent until now counts no more.
+    pub(crate) fn forget_sent(&self) {
+        self.wire.lock().unwrap().sent.clear();
+    }
+
     /// How often exactly these bytes were sent.
     pub(crate) fn sent(&self, request: &Request<'_>) -> usize {
         let adu = Adu::request(unit(1).into(), request);

@@ -4,7 +4,7 @@ use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex};
 
 use drivebus_line::{CallError, CallOptions, Done, Errand, Failure, PortErrorKind, Running};
-use drivebus_rtu::{Adu, Answer, OVERTAKING, Request};
+use drivebus_rtu::{Adu, Answer, ExceptionCode, OVERTAKING, Request, function};
 
 use crate::scripted::{Pieces, Rig, after, at_once, millis, right, unit};
 
@@ -111,6 +111,11 @@ fn what_is_read_back_waits_until_no_earlier_read_can_answer_it() {
     let words: Vec<u16> = (100..140).collect();
     let rig = Rig::new(move |_, request| match request {
         [1, 16, ..] | [1, 3, 0x10, ..] => Vec::new(),
+        // It gives them all, or none of them.
+        [1, 3, 0, 100..=255, _, 0..=39, ..] => {
+            let refusal = Answer::exception(function::READ_HOLDING, ExceptionCode::ILLEGAL_ADDRESS);
+            at_once(Adu::answer(unit(1), &refusal).as_bytes())
+        }
         _ => at_once(&right(request)),
     });
     rig.read(7, 1).unwrap();
