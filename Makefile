@@ -110,6 +110,8 @@ types: $(VENV)/.dev $(VENV)/.wheel
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 python/drivebus
+	$(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin python/drivebus
 	$(BIN)/python -m mypy.stubtest drivebus._native
 	$(BIN)/basedpyright
 

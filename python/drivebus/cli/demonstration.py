@@ -10,6 +10,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 import drivebus
 from drivebus.cli.present.output import Output
+from drivebus.cli.session import EXAMPLE_PORT
 
 __all__ = ["run"]
 
@@ -150,13 +151,11 @@ class _Job:
         self.out.say(
             "\nOn a real drive (wire A to A, B to B; `prepare` sets P00.01, P00.02 and P00.06):\n"
             "  drivebus ports\n"
-            "  drivebus --port /dev/ttyUSB0 scan\n"
-            "  drivebus --port /dev/ttyUSB0 info\n"
-            "  drivebus --port /dev/ttyUSB0 monitor\n"
-            "  drivebus --port /dev/ttyUSB0 prepare\n"
-            "  drivebus --port /dev/ttyUSB0 run 10\n"
-            "  drivebus --port /dev/ttyUSB0 stop\n"
-            "This is not a safety function: an emergency stop is a wire."
+            + "".join(
+                f"  drivebus --port {EXAMPLE_PORT} {command}\n"
+                for command in ("scan", "info", "monitor", "prepare", "run 10", "stop")
+            )
+            + "This is not a safety function: an emergency stop is a wire."
         )
 
     def title(self, text: str) -> None:

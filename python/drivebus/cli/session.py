@@ -42,6 +42,8 @@ __all__ = [
 DEFAULT_BAUD = 19_200
 DEFAULT_FORMAT = ("8", "E", "1")
 """As the factory sets a Goodrive."""
+EXAMPLE_PORT = "COM3" if sys.platform == "win32" else "/dev/ttyUSB0"
+"""What an adapter may be called on this system."""
 
 
 class Declined(click.ClickException):
@@ -313,7 +315,8 @@ class Session:
 
     def _line_words(self) -> list[str]:
         """The options for the line and the unit, where they are not as usual."""
-        words = ["--port", shlex.quote(str(self.port)), *self.setting_words()]
+        port = [] if self.port is None else ["--port", shlex.quote(str(self.port))]
+        words = [*port, *self.setting_words()]
         if self.unit != 1:
             words.append(f"--unit {self.unit}")
         if self.reserved:

@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-__all__ = ["ENDS", "heeded"]
+from drivebus.operations.program_end import END_SIGNALS as ENDS
 
-ENDS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-"""What ends programs, Ctrl-C aside: where it is there."""
+__all__ = ["ENDS", "heeded"]
 
 
 @contextmanager

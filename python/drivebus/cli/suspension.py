@@ -22,20 +22,24 @@ def gives_way_when_held(buses: Callable[[], Sequence[drivebus.Bus]]) -> Iterator
     """
     if sys.platform == "win32" or not _is_ours():
         yield
-        return
-
-    def hold(*_: object) -> None:
-        # Not here: this thread may have the line, and has to go on to give it up.
-        threading.Thread(target=_hold, args=(list(buses()),), name="drivebus-held", daemon=True).start()
-
-    signal.signal(signal.SIGTSTP, hold)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTSTP, signal.SIG_DFL)
+    else:
+        signal.signal(signal.SIGTSTP, _holder(buses))
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGTSTP, signal.SIG_DFL)
 
 
 if sys.platform != "win32":
+
+    def _holder(buses: Callable[[], Sequence[drivebus.Bus]]) -> Callable[..., None]:
+        """What Ctrl-Z does in `gives_way_when_held`."""
+
+        def hold(*_: object) -> None:
+            # Not here: this thread may have the line, and has to go on to give it up.
+            threading.Thread(target=_hold, args=(list(buses()),), name="drivebus-held", daemon=True).start()
+
+        return hold
 
     def _is_ours() -> bool:
         is_main = threading.current_thread() is threading.main_thread()

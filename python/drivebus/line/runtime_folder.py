@@ -18,7 +18,7 @@ def run_time_folder() -> Path:
         NotAllowed: The system has no such sockets, or there is no folder that is this user's alone.
     """
     if sys.platform == "win32":
-        raise NotAllowed("programs share a port over a Unix socket, and this system has none")
+        raise NotAllowed("programs of one computer meet at a Unix socket, and Python has none on this system")
     try:
         return Path(_native.run_time_folder())
     except OSError as error:

@@ -5,7 +5,14 @@ Beside `crates/line/src/ports/tty/settings.rs`, which does the same for ports th
 
 from __future__ import annotations
 
+import sys
 from typing import Any
+
+if sys.platform == "win32":
+    # Nothing below is called there: `settings` has none.
+    termios: Any = None
+else:
+    import termios
 
 __all__ = ["differences", "own", "set_again", "settings"]
 
@@ -22,9 +29,7 @@ _CMSPAR = 0o10000000000
 
 def settings(port: Any) -> list[Any] | None:
     """What the terminal behind *port* is set to; None where there is none, or nobody tells."""
-    try:
-        import termios
-    except ImportError:
+    if sys.platform == "win32":
         return None
     try:
         return termios.tcgetattr(port.fileno())
@@ -41,8 +46,6 @@ def own(port: Any) -> tuple[object, ...]:
 
 def set_again(port: Any, opened: list[Any]) -> tuple[list[str], list[str]]:
     """Sets *port* to *opened* where it is not any more: what it had otherwise, in words, and what is still so."""
-    import termios
-
     found = settings(port)
     changed = [] if found is None else differences(opened, found)
     if not changed:
@@ -60,8 +63,6 @@ def set_again(port: Any, opened: list[Any]) -> tuple[list[str], list[str]]:
 
 def differences(opened: list[Any], found: list[Any]) -> list[str]:
     """What *found* has otherwise than *opened*, in words."""
-    import termios
-
     told = []
     speeds = _speeds()
     # A driver that is told one speed keeps the other as it was; few have two.
@@ -88,14 +89,10 @@ def differences(opened: list[Any], found: list[Any]) -> list[str]:
 
 def _speeds() -> dict[int, int]:
     """How many bits a second are meant by each number that the system has for it."""
-    import termios
-
     return {value: int(name[1:]) for name, value in vars(termios).items() if name[:1] == "B" and name[1:].isdecimal()}
 
 
 def _parity(modes: int) -> str:
-    import termios
-
     if not modes & termios.PARENB:
         return "none"
     if modes & _CMSPAR:
@@ -104,15 +101,11 @@ def _parity(modes: int) -> str:
 
 
 def _data_bits(modes: int) -> str:
-    import termios
-
     sizes = {termios.CS5: 5, termios.CS6: 6, termios.CS7: 7, termios.CS8: 8}
     return f"{sizes[modes & termios.CSIZE]} data bits"
 
 
 def _stop_bits(modes: int) -> str:
-    import termios
-
     return "2 stop bits" if modes & termios.CSTOPB else "1 stop bit"
 
 

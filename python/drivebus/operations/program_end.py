@@ -26,10 +26,10 @@ from drivebus.errors import NotAllowed, NotReady
 from drivebus.latch import Latch
 from drivebus.operations.deferred_signals import DeferredSignals
 
-__all__ = ["Guard", "before_start", "end_over"]
+__all__ = ["END_SIGNALS", "Guard", "before_start", "end_over"]
 
-_SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-"""What ends a process at once unless somebody listens: asked to end, and its terminal closed."""
+END_SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
+"""What ends a process at once unless somebody listens: asked to end, its terminal closed, and Ctrl-Break on Windows."""
 
 _PATIENCE = 10.0
 """Seconds for which a start that is on its way is waited for, so that the stop comes after it."""
@@ -188,7 +188,7 @@ def _in_main_thread() -> bool:
 
 
 def _listen() -> None:
-    for number in _SIGNALS:
+    for number in END_SIGNALS:
         # Whoever listens already, or wants the signal ignored, has thought of it.
         if signal.getsignal(number) == signal.SIG_DFL:
             try:
@@ -198,7 +198,7 @@ def _listen() -> None:
 
 
 def _stop_listening() -> None:
-    for number in _SIGNALS:
+    for number in END_SIGNALS:
         if signal.getsignal(number) is _on_signal:
             signal.signal(number, signal.SIG_DFL)
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import select
 import socket
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable
+from functools import partial
 from types import TracebackType
 
 from drivebus import checks
@@ -73,8 +75,12 @@ class Replay:
         self._line = line
         self.unknown: set[bytes] = set()
         self._over = Latch()
-        self._wake, self._woken = os.pipe()
-        if transport == "tcp" or (transport == "auto" and not hasattr(os, "openpty")):
+        # Not a pipe: Windows waits for sockets alone.
+        self._wake, self._woken = socket.socketpair()
+        self._server: socket.socket | None = None
+        self._descriptors: list[int] = []
+        self.port: str
+        if transport == "tcp" or (transport == "auto" and sys.platform == "win32"):
             self._open_tcp()
         else:
             self._open_pty()
@@ -89,9 +95,11 @@ class Replay:
         """Ends it."""
         if not self._over.is_set():
             self._over.set()
-            os.write(self._woken, b"!")
+            self._woken.send(b"!")
             self._thread.join()
-            for descriptor in (self._wake, self._woken, *self._descriptors):
+            self._wake.close()
+            self._woken.close()
+            for descriptor in self._descriptors:
                 os.close(descriptor)
             if self._server is not None:
                 self._server.close()
@@ -105,52 +113,53 @@ class Replay:
         self.close()
 
     def _open_pty(self) -> None:
-        if not hasattr(os, "openpty"):
+        if sys.platform == "win32":
             raise NotAllowed(Text("this system has no pseudo-terminals; say ", argument("transport", "tcp")))
         import tty
 
         ours, theirs = os.openpty()
         tty.setraw(theirs)
-        self._server: socket.socket | None = None
         self._descriptors = [ours, theirs]
         self.port = os.ttyname(theirs)
 
     def _open_tcp(self) -> None:
         self._server = socket.create_server(("127.0.0.1", 0))
-        self._descriptors = []
         self.port = "socket://{}:{}".format(*self._server.getsockname())
 
     def _serve(self) -> None:
         """Answers whoever asks, one after the other."""
         if self._server is None:
-            self._talk(self._descriptors[0])
+            terminal = self._descriptors[0]
+            self._talk(terminal, partial(os.read, terminal), partial(os.write, terminal))
             return
+        wake = self._wake.fileno()
         while not self._over.is_set():
-            ready, _, _ = select.select([self._server.fileno(), self._wake], [], [])
-            if self._wake in ready:
+            ready, _, _ = select.select([self._server.fileno(), wake], [], [])
+            if wake in ready:
                 return
             client, _ = self._server.accept()
             with client:
-                self._talk(client.fileno())
+                self._talk(client.fileno(), client.recv, client.sendall)
 
-    def _talk(self, descriptor: int) -> None:
+    def _talk(self, descriptor: int, read: Callable[[int], bytes], write: Callable[[bytes], object]) -> None:
         heard = b""
+        wake = self._wake.fileno()
         while not self._over.is_set():
-            ready, _, _ = select.select([descriptor, self._wake], [], [], _LOOK_UP)
-            if self._wake in ready:
+            ready, _, _ = select.select([descriptor, wake], [], [], _LOOK_UP)
+            if wake in ready:
                 return
             if not ready:
                 heard = b""
                 continue
             try:
-                came = os.read(descriptor, _CHUNK)
+                came = read(_CHUNK)
             except OSError:
                 return
             if not came:
                 return
-            heard = self._answer_all(descriptor, heard + came)
+            heard = self._answer_all(write, heard + came)
 
-    def _answer_all(self, descriptor: int, heard: bytes) -> bytes:
+    def _answer_all(self, write: Callable[[bytes], object], heard: bytes) -> bytes:
         """Answers the requests in *heard*; returns what is none yet."""
         while (request := _first_frame(heard)) is not None:
             heard = heard[heard.index(request) + len(request) :]
@@ -158,7 +167,7 @@ class Replay:
             if answer is not None:
                 threading.Event().wait(self._line.t35)
                 try:
-                    os.write(descriptor, answer)
+                    write(answer)
                 except OSError:
                     return b""
         return heard

@@ -20,7 +20,7 @@ from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.exchanges import Filter, Lines
 from drivebus.cli.present.output import counted, remark
 from drivebus.cli.present.sniff_table import SniffTable
-from drivebus.cli.session import Session, pass_session
+from drivebus.cli.session import EXAMPLE_PORT, Session, pass_session
 from drivebus.cli.signals import ENDS, heeded
 from drivebus.sniffer import Exchange, Families, Figures
 
@@ -70,7 +70,7 @@ def sniff(
     """
     port = port or session.port
     if port is None:
-        raise click.UsageError("no port: give it, as in `drivebus sniff /dev/ttyUSB0`; `drivebus ports` lists them")
+        raise click.UsageError(f"no port: give it, as in `drivebus sniff {EXAMPLE_PORT}`; `drivebus ports` lists them")
     families = Families(parse_families(session.profile))
     units = _units(context, session)
     shown = Filter(units, frozenset(_function(text) for text in functions), errors)

@@ -109,7 +109,7 @@ def _check_terminal(session: Session, traces: bool) -> None:
             f"`fg`, or by `timeout --foreground` where timeout starts it; {plain}"
         )
     kind = os.environ.get("TERM", "")
-    if kind in ("", "dumb", "unknown") and os.name != "nt":
+    if kind in ("", "dumb", "unknown") and sys.platform != "win32":
         raise drivebus.NotAllowed(f'the panel needs a terminal with a cursor, and TERM is "{kind}"; {plain}')
     columns, lines = os.get_terminal_size(sys.stdout.fileno())
     if columns < _LEAST[0] or lines < _LEAST[1]:
@@ -121,8 +121,10 @@ def _check_terminal(session: Session, traces: bool) -> None:
 
 def _is_in_front() -> bool:
     """Whether the terminal is this program's now: one in the background is held as soon as it reads a key."""
+    if sys.platform == "win32":
+        return True
     try:
-        return os.name == "nt" or os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+        return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
     except OSError:  # a terminal that controls no programs
         return True
 

@@ -11,6 +11,7 @@ import os
 import socket
 import socketserver
 import struct
+import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -35,7 +36,12 @@ _AT_ONCE = 8
 """Who may talk at the same time; others are sent away."""
 
 
-class _Server(socketserver.ThreadingMixIn, socketserver.UnixStreamServer):
+_FAMILY: Any = getattr(socket, "AF_UNIX", None)
+"""Where Python has none, as on Windows, `run_time_folder` refuses before any is asked for."""
+
+
+class _Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
+    address_family = _FAMILY
     daemon_threads = True
     block_on_close = False
     request_queue_size = 4 * _AT_ONCE
@@ -43,7 +49,8 @@ class _Server(socketserver.ThreadingMixIn, socketserver.UnixStreamServer):
     def __init__(self, path: Path, obey: Callable[[Order], Order]) -> None:
         self.obey = obey
         self.room = threading.BoundedSemaphore(_AT_ONCE)
-        super().__init__(str(path), _Visit)
+        address: Any = str(path)
+        super().__init__(address, _Visit)
         path.chmod(0o600)
 
     def verify_request(self, request: Any, client_address: Any) -> bool:  # noqa: ARG002 - the base class names it
@@ -102,7 +109,7 @@ def _line(answer: Order) -> bytes:
 
 def _is_own(connection: socket.socket) -> bool:
     """Whether this user's program, or the administrator's, is at the other end. The folder keeps others out already."""
-    if not hasattr(socket, "SO_PEERCRED"):
+    if sys.platform == "win32" or not hasattr(socket, "SO_PEERCRED"):
         return True
     told = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
     _, user, _ = struct.unpack("3i", told)
@@ -155,7 +162,7 @@ def ask(path: Path, order: Order) -> Order:
         drivebus.NotAllowed: It refuses; nothing was changed.
         OSError: It is gone, or does not answer.
     """
-    with socket.socket(socket.AF_UNIX) as connection:
+    with socket.socket(_FAMILY) as connection:
         connection.settimeout(_PATIENCE)
         connection.connect(str(path))
         connection.sendall(json.dumps(order).encode() + b"\n")

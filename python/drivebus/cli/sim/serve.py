@@ -18,6 +18,7 @@ from drivebus.cli.option_types import Place, Whole
 from drivebus.cli.present.help_format import Listing
 from drivebus.cli.present.output import Output, remark
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.signals import ENDS
 from drivebus.cli.sim.control_commands import Orders, in_words
 from drivebus.cli.sim.control_socket import open_to_orders
 from drivebus.cli.sim.rates import rates_of
@@ -117,9 +118,8 @@ def sim(
         ear=False if ear is None else ear or True,
     )
     # Whoever ends it, the link goes with it.
-    for name in ("SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.default_int_handler)
+    for number in ENDS:
+        signal.signal(number, signal.default_int_handler)
     with simulator:
         if simulator.transport == "process":
             raise drivebus.PortError(
@@ -133,22 +133,30 @@ def sim(
         orders = Orders(simulator, opened, session.out.say, heard_at)
         try:
             with ExitStack() as open_things:
-                _take_orders(open_things, orders)
+                takes_orders = _take_orders(open_things, orders)
                 # Whoever reads the port may end it at once.
                 session.out.render(
-                    _Served(simulator, opened(), heard_at, "".join(f" {word}" for word in session.setting_words()))
+                    _Served(
+                        simulator,
+                        opened(),
+                        heard_at,
+                        "".join(f" {word}" for word in session.setting_words()),
+                        takes_orders,
+                    )
                 )
                 Latch().wait()
         except KeyboardInterrupt:
             session.out.say("")
 
 
-def _take_orders(open_things: ExitStack, orders: Orders) -> None:
-    """Lets other windows give orders. Where they cannot, that is said, and the rest goes on."""
+def _take_orders(open_things: ExitStack, orders: Orders) -> bool:
+    """Lets other windows give orders. Where they cannot, that is said, this is false, and the rest goes on."""
     try:
         open_things.enter_context(open_to_orders(orders.obey))
     except (drivebus.NotAllowed, OSError) as error:
         remark(f"Warning: this simulation takes no orders by `drivebus sim ctl`: {error}")
+        return False
+    return True
 
 
 @dataclass(frozen=True)
@@ -160,12 +168,14 @@ class _Served:
         opened: What other programs open.
         ear: What they open to listen; None for nothing.
         line_words: The options for the line, as they are typed behind `drivebus`.
+        takes_orders: Whether other windows can give some.
     """
 
     simulator: drivebus.Simulator
     opened: str
     ear: str | None
     line_words: str
+    takes_orders: bool
 
     def _drives(self) -> dict[int, str]:
         return {unit: self.simulator.drive(unit).profile for unit in self.simulator.units}
@@ -203,7 +213,8 @@ class _Served:
         out.say(f"Try in another window: `drivebus --port {shlex.quote(opened)}{self.line_words}{which} info`")
         if ear is not None:
             out.say(f"Hear it: `drivebus{self.line_words} sniff {shlex.quote(ear)}`")
-        out.say("Trip, load, unplug: `drivebus sim ctl --help`")
+        if self.takes_orders:
+            out.say("Trip, load, unplug: `drivebus sim ctl --help`")
         out.say("Ctrl-C ends it.")
 
 
