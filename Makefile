@@ -4,7 +4,9 @@
 PYTHON ?= python3
 TEST_JOBS ?= 4
 VENV   := .venv
-BIN    := $(VENV)/bin
+# What an environment calls the folder of its programs.
+BINS   := $(if $(filter Windows_NT,$(OS)),Scripts,bin)
+BIN    := $(VENV)/$(BINS)
 CARGO  := cargo
 LOCKED := --locked
 
@@ -26,7 +28,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 .DELETE_ON_ERROR:
 .PHONY: help demo test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
         machine screens format schema types layers rust-lint rust-build rust-test counts counts-update python-collect python-test interop-parts examples wheel-smoke \
-        pictures matrix semver release-check release-readme archives publish-crates
+        pictures matrix semver sdist release-check release-readme archives publish-crates
 
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
@@ -268,7 +270,8 @@ oldest: $(VENV)/.dev ## of what the published crates need, the oldest versions
 
 # A release is a tag v1.2.3. Until there is one, nothing is promised, and the tool is not needed either.
 SEMVER   := .tools/cargo-semver-checks/bin/cargo-semver-checks
-LAST_TAG  = $(shell git describe --tags --abbrev=0 --match 'v[0-9]*' 2>/dev/null)
+# The tag before this commit: the release that is being made is held to the one before.
+LAST_TAG  = $(shell git describe --tags --abbrev=0 --match 'v[0-9]*' HEAD^ 2>/dev/null)
 PUBLISHED := drivebus-rtu drivebus-line drivebus-drives drivebus-sim drivebus
 
 $(SEMVER):
@@ -283,20 +286,24 @@ RELEASE := .venv-release
 
 $(RELEASE)/.installed: pyproject.toml | machine
 	$(PYTHON) -m venv --clear $(RELEASE)
-	$(RELEASE)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
-	$(RELEASE)/bin/python -m pip install --quiet --group release
+	$(RELEASE)/$(BINS)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(RELEASE)/$(BINS)/python -m pip install --quiet --group release
 	@touch $@
 
+sdist: $(RELEASE)/.installed ## the source distribution, in dist/
+	@mkdir -p dist && rm -f dist/drivebus-*.tar.gz
+	$(RELEASE)/$(BINS)/maturin sdist --out dist
+
 release-check: semver $(RELEASE)/.installed ## some ten minutes; of what is committed
-	$(RELEASE)/bin/python -m tools.release_check
+	$(RELEASE)/$(BINS)/python -m tools.release_check
 
 # The last steps of a release, where nobody works on: see .github/workflows/release.yml.
 release-readme: $(RELEASE)/.installed ## changes a file: the links of README.md, before what is published is built
-	$(RELEASE)/bin/python tools/absolute_links.py README.md
+	$(RELEASE)/$(BINS)/python tools/absolute_links.py README.md
 
 archives: $(RELEASE)/.installed ## what lies in dist/ and is about to be published
-	$(RELEASE)/bin/python -m twine check --strict dist/*.whl dist/*.tar.gz
-	$(RELEASE)/bin/python -m tools.check_archives dist/*.whl dist/*.tar.gz
+	$(RELEASE)/$(BINS)/python -m twine check --strict dist/*.whl dist/*.tar.gz
+	$(RELEASE)/$(BINS)/python -m tools.check_archives dist/*.whl dist/*.tar.gz
 
 publish-crates: ## uploads; each after those that it needs
 	$(CARGO) publish $(LOCKED) $(PUBLISHED:%=--package %)

@@ -9,6 +9,7 @@ usage: python -m tools.release_check
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -53,6 +54,17 @@ def cloned() -> None:
         folder.mkdir(parents=True)
     run("git", "clone", "--quiet", ROOT, TREE, at=FOLDER)
     run(sys.executable, "tools/absolute_links.py", "README.md", at=TREE)
+
+
+def tagged() -> None:
+    """Sees that a tag of this commit names its version, and that the changelog then has the day."""
+    version = project(TREE).version
+    tags = run("git", "tag", "--points-at", "HEAD", "--list", "v[0-9]*", at=TREE).split()
+    if tags not in ([], [f"v{version}"]):
+        sys.exit(f"release_check: this commit is tagged {' and '.join(tags)}, and its version is {version}")
+    dated = re.compile(rf"^## \[{re.escape(version)}\] - \d{{4}}-\d\d-\d\d$", re.MULTILINE)
+    if tags and not dated.search((TREE / "CHANGELOG.md").read_text(encoding="utf-8")):
+        sys.exit(f"release_check: CHANGELOG.md does not have the day of {version}: ## [{version}] - YYYY-MM-DD")
 
 
 def crates() -> list[Path]:
@@ -104,6 +116,7 @@ def main() -> None:
     """Everything, in the order of what fails soonest."""
     cloned()
     tell(f"drivebus {project(TREE).version} of {run('git', 'rev-parse', '--short', 'HEAD', at=TREE).strip()}")
+    tagged()
     source = sdist()
     tell(f"sdist: {source.name}, {source.stat().st_size} bytes")
     packed = crates()
