@@ -2,9 +2,9 @@
 
 Each holds both licences and the version, and the links of its description hold on the page of a package index. A wheel
 and an sdist name the project's address, and classifiers that exist. A crate has what its registry asks for. Exit code 1
-with a line for each finding.
+with a line for each finding. `--self-test` breaks each rule once in a copy and expects to be told so.
 
-usage: python -m tools.check_archives ARCHIVE...
+usage: python -m tools.check_archives [--self-test] ARCHIVE...
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import sys
 import tarfile
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from subprocess import run
@@ -29,7 +29,8 @@ LINKS = {"Source", "Documentation", "Changelog", "Issues"}
 """What a page of the package index shall link to."""
 CRATE = ("description", "license", "repository", "readme", "keywords", "categories", "rust-version")
 LONGEST = 10 * 1024 * 1024
-"""Of a crate, in bytes; its registry takes no longer ones."""
+"""Of an archive, in bytes; the registry of crates takes no longer ones."""
+METADATA = (".dist-info/METADATA", "/PKG-INFO")
 
 
 class Links(HTMLParser):
@@ -78,7 +79,7 @@ def lost(markdown: str, ours: Project, root: Path = ROOT) -> Iterator[str]:
 
 def python_findings(files: dict[str, bytes], ours: Project) -> Iterator[str]:
     """What is wrong with an sdist or a wheel."""
-    name = next((name for name in sorted(files, key=len) if name.endswith((".dist-info/METADATA", "/PKG-INFO"))), None)
+    name = next((name for name in sorted(files, key=len) if name.endswith(METADATA)), None)
     if name is None:
         yield "has no metadata"
         return
@@ -117,26 +118,55 @@ def content(archive: Path) -> dict[str, bytes]:
         return {each.name: file.read() for each in packed if (file := packed.extractfile(each)) is not None}
 
 
-def findings(archive: Path, ours: Project) -> Iterator[str]:
-    """What is wrong with *archive*, a sentence each."""
-    files = content(archive)
+def findings(files: dict[str, bytes], ours: Project) -> Iterator[str]:
+    """What is wrong with an archive of *files*, a sentence each."""
     for licence in LICENCES:
         text = (ROOT / licence).read_bytes()
         if not any(name.endswith(f"/{licence}") and held == text for name, held in files.items()):
             yield f"lacks the text of {licence}"
-    if archive.suffix == ".crate":
-        yield from crate_findings(files, ours)
-        if archive.stat().st_size > LONGEST:
-            yield f"is longer than {LONGEST} bytes"
-    else:
-        yield from python_findings(files, ours)
+    yield from (crate_findings if is_crate(files) else python_findings)(files, ours)
+
+
+def is_crate(files: dict[str, bytes]) -> bool:
+    """Whether *files* are those of a crate; cargo keeps the manifest that somebody wrote beside the one it made."""
+    return any(name.endswith("/Cargo.toml.orig") for name in files)
+
+
+def broken(files: dict[str, bytes], ours: Project) -> Iterator[tuple[str, dict[str, bytes]]]:
+    """*files* with one rule broken, each with what shall be said of it."""
+    facts, page = ("/Cargo.toml", "/README.md") if is_crate(files) else (METADATA, METADATA)
+
+    def changed(where: str | tuple[str, ...], change: Callable[[bytes], bytes]) -> dict[str, bytes]:
+        return {name: change(held) if name.endswith(where) else held for name, held in files.items()}
+
+    yield "lacks the text", {name: held for name, held in files.items() if not name.endswith(LICENCES)}
+    yield "only in the repository", changed(page, lambda held: held + b"\n[a](docs/a.md)\n")
+    yield "the tag does not have", changed(page, lambda held: held + f"\n[a]({ours.address}/blob/main/a)\n".encode())
+    yield f"not {ours.version}", changed(facts, lambda held: held.replace(ours.version.encode(), b"0.0.0"))
+    yield "https://a.example", changed(facts, lambda held: held.replace(ours.address.encode(), b"https://a.example"))
+
+
+def self_test(archives: list[Path], ours: Project) -> int:
+    """Breaks each rule in each archive; prints what was not noticed."""
+    missed = 0
+    for archive in archives:
+        for said, files in broken(content(archive), ours):
+            if not any(said in finding for finding in findings(files, ours)):
+                missed += 1
+                print(f"check_archives: {archive.name}: not noticed: {said}", file=sys.stderr)
+    return 1 if missed else 0
 
 
 def main() -> int:
     """Prints a line for each archive, and one for each finding."""
-    archives, ours, wrong = [Path(name) for name in sys.argv[1:]], project(), 0
+    names = sys.argv[1:]
+    archives, ours, wrong = [Path(name) for name in names if name != "--self-test"], project(), 0
+    if "--self-test" in names:
+        return self_test(archives, ours)
     for archive in archives:
-        found = list(findings(archive, ours))
+        found = list(findings(content(archive), ours))
+        if archive.stat().st_size > LONGEST:
+            found.append(f"is longer than {LONGEST} bytes")
         wrong += len(found)
         print(f"check_archives: {archive.name}: {'ok' if not found else f'{len(found)} wrong'}", flush=True)
         for finding in found:

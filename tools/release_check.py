@@ -125,6 +125,8 @@ def main() -> None:
     run(sys.executable, "-m", "twine", "check", "--strict", source, built, at=FOLDER)
     tell("twine check --strict: passed")
     print(run(sys.executable, "-m", "tools.check_archives", source, built, *packed, at=TREE), end="", flush=True)
+    run(sys.executable, "-m", "tools.check_archives", "--self-test", source, built, *packed, at=TREE)
+    tell("each rule for archives, broken once in a copy: noticed")
     tell(f"the wheel, installed where nothing else is: {demo(built)}")
     tell("everything passed")
 
