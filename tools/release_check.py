@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 import venv
+import zipfile
 from pathlib import Path
 
 from tools.absolute_links import ROOT, project
@@ -100,6 +101,16 @@ def wheel(source: Path) -> Path:
     return archive
 
 
+def whole(archive: Path) -> None:
+    """Sees that the wheel has each file of the package, and no other but the compiled one."""
+    with zipfile.ZipFile(archive) as packed:
+        held = {name for name in packed.namelist() if name.startswith("drivebus/")}
+    known = set(run("git", "ls-files", "drivebus", at=TREE / "python").splitlines())
+    wrong = sorted(name for name in held ^ known if not name.startswith("drivebus/_native."))
+    if wrong:
+        sys.exit(f"release_check: {archive.name} and python/drivebus do not have the same files: {', '.join(wrong)}")
+
+
 def demo(archive: Path) -> str:
     """The last line of `drivebus demo` where only the wheel was installed."""
     with tempfile.TemporaryDirectory(prefix="drivebus-installed-") as folder:
@@ -122,6 +133,7 @@ def main() -> None:
     packed = crates()
     built = wheel(source)
     tell(f"wheel from the sdist, in an empty folder: {built.name}, {built.stat().st_size} bytes")
+    whole(built)
     run(sys.executable, "-m", "twine", "check", "--strict", source, built, at=FOLDER)
     tell("twine check --strict: passed")
     print(run(sys.executable, "-m", "tools.check_archives", source, built, *packed, at=TREE), end="", flush=True)
