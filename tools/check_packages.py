@@ -86,9 +86,10 @@ def main() -> None:
     shown = subprocess.run(
         [CARGO, "run", "--quiet"], cwd=folder, env=environment, check=True, stdout=subprocess.PIPE, text=True
     ).stdout
-    print(f"{len(crates)} crates packaged; a stranger's program built with them shows {' · '.join(shown.splitlines())}")
+    shows = " · ".join(shown.splitlines())
+    print(f"{len(crates)} crates packaged; a stranger's program built with them shows {shows}", flush=True)
     if not asked.without_tests:
-        subprocess.run([CARGO, "test", "--quiet", "--workspace"], cwd=packages, env=environment, check=True)
+        sys.exit(subprocess.run([CARGO, "test", "--quiet", "--workspace"], cwd=packages, env=environment).returncode)
 
 
 if __name__ == "__main__":
