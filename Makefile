@@ -1,10 +1,12 @@
 # Every command of this project. People and CI run the same lines.
-# All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .venv-fuzz/, .tools/, target/ and dist/.
+# All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .venv-fuzz/, .venv-release/, .tools/, target/ and dist/.
 
 PYTHON ?= python3
 TEST_JOBS ?= 4
 VENV   := .venv
-BIN    := $(VENV)/bin
+# What an environment calls the folder of its programs.
+BINS   := $(if $(filter Windows_NT,$(OS)),Scripts,bin)
+BIN    := $(VENV)/$(BINS)
 CARGO  := cargo
 LOCKED := --locked
 
@@ -26,7 +28,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 .DELETE_ON_ERROR:
 .PHONY: help demo test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
         machine screens format schema types layers rust-lint rust-build rust-test counts counts-update python-collect python-test interop-parts examples wheel-smoke \
-        pictures matrix semver
+        pictures matrix semver sdist release-check release-readme archives publish-crates
 
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
@@ -41,6 +43,7 @@ help: ## what can be made
 	@echo "make soak    a hostile line: a day in virtual time, an hour in real time"
 	@echo "make packages   the published crates' tests, from their packages alone"
 	@echo "make semver  what the published crates promise, compared with the last tag"
+	@echo "make release-check   all that a release uploads, but the upload: made in a fresh clone, and used"
 	@echo "make oldest  somebody's Rust program with the oldest versions of what the crates need"
 	@echo "make pictures   the pictures of the README, from what the commands show"
 	@echo "make wheel   the wheel, in dist/"
@@ -269,7 +272,8 @@ oldest: $(VENV)/.dev ## of what the published crates need, the oldest versions
 
 # A release is a tag v1.2.3. Until there is one, nothing is promised, and the tool is not needed either.
 SEMVER   := .tools/cargo-semver-checks/bin/cargo-semver-checks
-LAST_TAG  = $(shell git describe --tags --abbrev=0 --match 'v[0-9]*' 2>/dev/null)
+# The tag before this commit: the release that is being made is held to the one before.
+LAST_TAG  = $(shell git describe --tags --abbrev=0 --match 'v[0-9]*' HEAD^ 2>/dev/null)
 PUBLISHED := drivebus-rtu drivebus-line drivebus-drives drivebus-sim drivebus
 
 $(SEMVER):
@@ -279,6 +283,32 @@ $(SEMVER):
 semver: $(if $(LAST_TAG),$(SEMVER)) ## a break since the last tag that the version does not say
 	@$(if $(LAST_TAG),set -x; $(SEMVER) semver-checks --baseline-rev $(LAST_TAG) $(PUBLISHED:%=--package %),\
 	    echo "make semver: there is no tag v* yet, so nothing to compare with")
+
+RELEASE := .venv-release
+
+$(RELEASE)/.installed: pyproject.toml | machine
+	$(PYTHON) -m venv --clear $(RELEASE)
+	$(RELEASE)/$(BINS)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(RELEASE)/$(BINS)/python -m pip install --quiet --group release
+	@touch $@
+
+sdist: $(RELEASE)/.installed ## the source distribution, in dist/
+	@mkdir -p dist && rm -f dist/drivebus-*.tar.gz
+	$(RELEASE)/$(BINS)/maturin sdist --out dist
+
+release-check: semver $(RELEASE)/.installed ## some ten minutes; of what is committed
+	$(RELEASE)/$(BINS)/python -m tools.release_check
+
+# The last steps of a release, where nobody works on: see .github/workflows/release.yml.
+release-readme: $(RELEASE)/.installed ## changes a file: the links of README.md, before what is published is built
+	$(RELEASE)/$(BINS)/python tools/absolute_links.py README.md
+
+archives: $(RELEASE)/.installed ## what lies in dist/ and is about to be published
+	$(RELEASE)/$(BINS)/python -m twine check --strict dist/*.whl dist/*.tar.gz
+	$(RELEASE)/$(BINS)/python -m tools.check_archives dist/*.whl dist/*.tar.gz
+
+publish-crates: ## uploads; each after those that it needs
+	$(CARGO) publish $(LOCKED) $(PUBLISHED:%=--package %)
 
 # Chance comes from the seed, which is printed: make soak SEED=7 HOURS=1
 SEED  ?= $(shell date +%s)
@@ -296,4 +326,4 @@ soak-realtime: $(VENV)/.wheel
 	$(BIN)/python tools/soak_realtime.py --minutes $(MINUTES) --seed $(SEED)
 
 clean: ## removes what was built and set up here
-	rm -rf $(VENV) $(PEERS) $(BENCH_PEERS) $(FUZZ_VENV) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) $(PEERS) $(BENCH_PEERS) $(FUZZ_VENV) $(RELEASE) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks

@@ -29,7 +29,8 @@ if [ "${2:-}" = rust ]; then
             lacks "$tool $need or newer (this one is $have)" "rustup update stable" "rustup update stable"
         fi
     done
-    command -v cc >/dev/null 2>&1 ||
+    # On Windows, Rust finds its linker where no path leads.
+    command -v cc >/dev/null 2>&1 || [ "${OS:-}" = Windows_NT ] ||
         lacks "a C compiler (Rust links with it)" "apt-get install build-essential" "xcode-select --install"
 fi
 

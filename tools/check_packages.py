@@ -1,13 +1,16 @@
-"""Packages each crate that is published, and runs its tests from what was packaged, with the others packaged beside it.
+"""Packages each crate that is published, and uses what was packaged, with the others packaged beside it.
 
-What a package leaves out shows here and not with who takes it. Exit code 1 when a test fails.
+A program of somebody else's, which is the one of the README of `drivebus`, is built with the packages and run. Then the
+tests of each package run. What a package leaves out shows here and not with who takes it. Exit code 1 where one fails.
 
-usage: check_packages.py
+usage: check_packages.py [--without-tests]
 """
 
 from __future__ import annotations
 
+import argparse
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -41,18 +44,52 @@ def unpacked(crates: dict[str, str]) -> Path:
         with tarfile.open(TARGET / f"package/{package}.crate") as crate:
             crate.extractall(folder, filter="data")
     # Each shall find the other as it was packaged.
-    patches = "".join(f"{name} = {{ path = '{package}' }}\n" for name, package in packages.items())
-    manifest = f'[workspace]\nresolver = "3"\nmembers = {list(packages.values())}\n\n[patch.crates-io]\n{patches}'
+    manifest = f'[workspace]\nresolver = "3"\nmembers = {list(packages.values())}\n\n{patched(packages)}'
     (folder / "Cargo.toml").write_text(manifest, encoding="utf-8")
     shutil.copy2(ROOT / "Cargo.lock", folder)
     return folder
 
 
+def patched(places: dict[str, str]) -> str:
+    """What has cargo take each crate from its place, until the registry has it."""
+    return "[patch.crates-io]\n" + "".join(f"{name} = {{ path = '{place}' }}\n" for name, place in places.items())
+
+
+def stranger(packages: Path, crates: dict[str, str]) -> Path:
+    """A project outside of the workspace with the program of the README of `drivebus`, for what cargo finds for it."""
+    folder = TARGET / "stranger"
+    shutil.rmtree(folder / "src", ignore_errors=True)
+    (folder / "src").mkdir(parents=True)
+    (folder / "Cargo.lock").unlink(missing_ok=True)
+    places = {name: str(packages / f"{name}-{version}") for name, version in crates.items()}
+    program = re.search(r"^```rust\n(.*?)^```$", Path(places["drivebus"], "README.md").read_text("utf-8"), re.M | re.S)
+    if program is None:
+        sys.exit("check_packages: the README of the packed drivebus has no program")
+    (folder / "src/main.rs").write_text(program[1], encoding="utf-8")
+    (folder / "Cargo.toml").write_text(
+        '[package]\nname = "stranger"\nversion = "0.0.0"\nedition = "2024"\n\n[dependencies]\n'
+        f'drivebus = "={crates["drivebus"]}"\n\n{patched(places)}\n[workspace]\n',
+        encoding="utf-8",
+    )
+    return folder
+
+
 def main() -> None:
     """The command."""
-    folder = unpacked(published())
+    options = argparse.ArgumentParser(description="Packages the published crates and uses the packages.")
+    options.add_argument("--without-tests", action="store_true", help="only somebody else's program")
+    asked = options.parse_args()
+    crates = published()
+    packages = unpacked(crates)
     environment = {**os.environ, "CARGO_TARGET_DIR": str(TARGET / "packages-target")}
-    sys.exit(subprocess.run([CARGO, "test", "--quiet", "--workspace"], cwd=folder, env=environment).returncode)
+    folder = stranger(packages, crates)
+    shown = subprocess.run(
+        [CARGO, "run", "--quiet"], cwd=folder, env=environment, check=True, stdout=subprocess.PIPE, text=True
+    ).stdout
+    shows = " · ".join(shown.splitlines())
+    print(f"{len(crates)} crates packaged; a stranger's program built with them shows {shows}", flush=True)
+    if not asked.without_tests:
+        sys.exit(subprocess.run([CARGO, "test", "--quiet", "--workspace"], cwd=packages, env=environment).returncode)
 
 
 if __name__ == "__main__":

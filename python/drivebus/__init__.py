@@ -12,6 +12,14 @@
 This is not a safety function. An emergency stop is a wire.
 """
 
+import sys
+
+if sys.version_info < (3, 10):  # noqa: UP036 - pip refuses these, a folder that was copied does not
+    raise ImportError(
+        f"drivebus needs Python 3.10 or newer; this is {sys.version.split()[0]}, so start your program with another "
+        f"one than {sys.executable}"
+    )
+
 from typing import TYPE_CHECKING
 
 from drivebus.lazy_names import later
@@ -194,7 +202,7 @@ if not TYPE_CHECKING:
                 "Status",
             ),
         },
-        modules=("doctor", "record", "rtu", "sim", "trial"),
+        modules=("_native", "doctor", "record", "rtu", "sim", "trial"),
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
+from types import ModuleType
 
 __all__ = ["later"]
 
@@ -24,12 +25,28 @@ def later(package: str, homes: Mapping[str, Sequence[str]], modules: Sequence[st
 
     def fetch(name: str) -> object:
         if name in modules:
-            return import_module(f"{package}.{name}")
+            return _loaded(f"{package}.{name}")
         home = next((home for home, names in homes.items() if name in names), None)
         if home is None:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        found: object = getattr(import_module(f"{package}.{home}"), name)
+        found: object = getattr(_loaded(f"{package}.{home}"), name)
         setattr(sys.modules[package], name, found)
         return found
 
     return fetch
+
+
+def _loaded(module: str) -> ModuleType:
+    """The module of that name; where the compiled core cannot be loaded, the error says what to do."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        if "_native" not in str(error):
+            raise
+        import sysconfig
+
+        this = f"{sys.implementation.name} {sys.version.split()[0]} on {sysconfig.get_platform()}"
+        raise ImportError(
+            f"drivebus has no compiled part for this {this}: install the wheel that is for it, with "
+            f"`{sys.executable} -m pip install --force-reinstall drivebus` ({error})"
+        ) from None

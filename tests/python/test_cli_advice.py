@@ -143,3 +143,8 @@ def test_a_drive_with_a_fault(virtual: drivebus.Simulator, monkeypatch: pytest.M
     result = CliRunner().invoke(cli, ["--port", "line", "run", "5", "--yes"])
     assert result.exit_code == 2
     assert "then `drivebus reset`" in result.stderr
+
+
+def test_a_command_that_is_advised_names_no_port_where_none_was_given() -> None:
+    said = CliRunner().invoke(cli, ["panel"], env={"DRIVEBUS_PORT": ""}).stderr
+    assert "`drivebus --port … monitor`" in said

@@ -315,8 +315,7 @@ class Session:
 
     def _line_words(self) -> list[str]:
         """The options for the line and the unit, where they are not as usual."""
-        port = [] if self.port is None else ["--port", shlex.quote(str(self.port))]
-        words = [*port, *self.setting_words()]
+        words = ["--port", "…" if self.port is None else shlex.quote(str(self.port)), *self.setting_words()]
         if self.unit != 1:
             words.append(f"--unit {self.unit}")
         if self.reserved:

@@ -175,9 +175,11 @@ def _sqlite_rows(path: Path, name: str) -> _Rows:
 
 
 def _parquet_rows(path: Path, name: str) -> _Rows:
-    import pyarrow
-    import pyarrow.parquet
-
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise NotAllowed(f"{path.suffix} files need {error.name}: pip install 'drivebus[parquet]'") from None
     try:
         table = pyarrow.parquet.read_table(path)
     except FileNotFoundError as error:
