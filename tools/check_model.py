@@ -562,15 +562,7 @@ BREAKS = [
         TWO_PARTS,
         "is_apart(first_part(request, first)) && is_apart",
         "is_apart",
-        "overtaking-sixteen --faults 0 --requests 7",
-    ),
-    Break(
-        "the last part of a read has a length that nothing open has",
-        TWO_PARTS,
-        "&& is_apart(last_part(request, last))",
-        "",
-        "overtaking-sixteen --faults 0 --requests 7",
-        beside=(TWO_PARTS, "known.longer.is_apart(&known.master, now, unit, &request)", "unit >= UnitAddress::MIN"),
+        "overtaking-sixteen --requests 6",
     ),
     Break(
         "a write waits until nothing open could confirm it",
