@@ -21,12 +21,12 @@ default_role = "code"
 napoleon_use_ivar = True
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
-autodoc_class_signature = "separated"
 
 html_theme = "furo"
 html_title = f"drivebus {version}"
 html_copy_source = False
 html_show_sphinx = False
+html_show_copyright = False
 
 
 def keep_colons(*told: Any) -> None:

@@ -37,8 +37,11 @@ def family_page(name: str) -> str:
     rows = [profile.describe(each) for each in profile.names()]
     registers = [row for row in rows if row.kind == "register"]
     parameters = [row for row in rows if row.kind == "parameter"]
+    title, _, written = (ABOUT / name / "about.md").read_text(encoding="utf-8").strip().partition("\n\n")
     parts = [
-        (ABOUT / name / "about.md").read_text(encoding="utf-8").strip(),
+        title,
+        _table(("in short", ""), _in_short(profile)),
+        written,
         "## The profile\n",
         f"Name it `{name}`: `drivebus --profile {name} …`, or `bus.drive(1, {json.dumps(name)})`. "
         f"`drivebus profiles show {name}` prints these rules:",
@@ -59,6 +62,31 @@ def family_page(name: str) -> str:
 def _from(name: str) -> str:
     """The way from what is written of a family to the page of all families."""
     return os.path.relpath(ROOT / "docs/families.md", ABOUT / name)
+
+
+def _in_short(profile: drivebus.Profile) -> list[tuple[str, str]]:
+    """What one wants to know before anything else."""
+    serial, memory = profile.serial(), profile.memory()
+    line = "not known"
+    if serial is not None:
+        line = f"{serial.baud_rate} bit/s, {serial.format}, unit {serial.unit}"
+        line += "" if serial.verified else " (unverified)"
+    needs = [f"{each.code} = {each.value}" + ("" if each.verified else " (unverified)") for each in profile.control()]
+    proved = {each for each in profile.commands() if profile.command_reason(each) is None}
+    # Between the words of a start, the state has to be seen.
+    is_seen = not profile.start_sequence() or profile.state_reason() is None
+    run = "yes" if "run_forward" in proved and proved & {"stop", "coast"} and is_seen else "with --unverified"
+    if "run_forward" not in profile.commands():
+        run = "no"
+    kept = "each write may wear EEPROM"
+    if memory is not None:
+        kept = "RAM, or EEPROM with --store" + (" (unverified)" if memory.reason else "")
+    return [
+        ("line from the factory", line),
+        ("obeys the bus with", ", ".join(needs) or "not known"),
+        ("run and stop", run),
+        ("parameters are written to", kept),
+    ]
 
 
 def _rules(name: str) -> str:

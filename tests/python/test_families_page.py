@@ -212,7 +212,10 @@ def test_a_motor_runs_where_the_page_says_so(family: str) -> None:
 def test_a_page_is_made_of_each_profile(family: str) -> None:
     """The page of the site has what is written, each row, and the counts that `profiles show` prints."""
     page = family_page(family)
-    assert page.startswith((PROFILES / family / "about.md").read_text(encoding="utf-8").rstrip())
+    title, _, written = (PROFILES / family / "about.md").read_text(encoding="utf-8").rstrip().partition("\n\n")
+    assert page.startswith(title)
+    assert f"\n\n{written}\n\n" in page
+    assert f"| run and stop | {may_run(family).strip('`').replace('--', 'with --')} |" in page
     for kind, rows in rows_of(family).items():
         body = page.partition(f"## {kind.capitalize()} of ")[2].partition("\n## ")[0]
         made = [line for line in body.splitlines() if line.startswith("| ")][2:]

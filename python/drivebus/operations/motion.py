@@ -143,9 +143,9 @@ async def stop(unit: DriveView, *, confirm: float = 1.0, within: float = WITHIN,
 
 
 async def coast(unit: DriveView, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
-    """Switches the output off: the motor turns on until friction stops it. Arguments and errors as for `stop`.
+    """Switches the output off: the motor freewheels to a stop. Arguments and errors as for `stop`.
 
-    Returns when the drive is stopped: what coasts has no ramp.
+    Returns when the drive reports that it is stopped: a coast has no ramp.
     """
     await _halt(unit.trusting(unverified), "coast", confirm, within)
 
