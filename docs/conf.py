@@ -16,6 +16,8 @@ exclude_patterns = ["conf.py"]
 
 myst_heading_anchors = 4
 highlight_language = "text"
+# Two dashes are the beginning of an option.
+smartquotes = False
 # Docstrings quote code by one backtick, as Markdown does.
 default_role = "code"
 napoleon_use_ivar = True

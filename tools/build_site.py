@@ -9,6 +9,7 @@ usage: build_site.py [--rust FOLDER] [OUT]
 from __future__ import annotations
 
 import argparse
+import html
 import os
 import re
 import shutil
@@ -26,6 +27,8 @@ DOCS = ROOT / "docs"
 TARGET = ROOT / "target"
 RUST = re.compile(r"^```rust[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!\w+:|#)([^)#\s]+)((?:#[^)\s]*)?)\)")
+FETCHED = re.compile(r"<(?:script|link|img|iframe|source)\b[^>]*\b(?:src|href)=\"(?:https?:)?//[^>]*>")
+IMPORTED = re.compile(r"(?:@import|url\()\s*[\"']?(?:https?:)?//[^;)]*")
 # Where the repository can be read, once it is published: links to its sources lead there.
 REPOSITORY = os.environ.get("DRIVEBUS_REPOSITORY_URL", "")
 
@@ -42,6 +45,15 @@ CONTENTS: Contents = [
     ("For developers", ["developers/index"]),
 ]
 """What the first page leads to, by heading. A page that is in no contents is an error of the build."""
+
+CRATES = {
+    "crates/drivebus": "drivebus",
+    "crates/rtu": "drivebus_rtu",
+    "crates/line": "drivebus_line",
+    "crates/drives": "drivebus_drives",
+    "crates/sim": "drivebus_sim",
+}
+"""What cargo doc calls the folder of each published crate."""
 
 BELOW = {"families": "families", "reference/index": "reference", "developers/index": "developers"}
 """The pages that have contents of their own: those of a folder."""
@@ -100,8 +112,8 @@ def placed(path: Path) -> str | None:
     return None
 
 
-def rewritten(text: str, path: Path) -> str:
-    """The *text* of a page at *path*, with links as they lead in the site."""
+def rewritten(text: str, path: Path, *, rust: bool = False) -> str:
+    """The *text* of a page at *path*, with links as they lead in the site; *rust* where the crates' pages are in it."""
     here = placed(path)
     assert here is not None, path
 
@@ -112,6 +124,10 @@ def rewritten(text: str, path: Path) -> str:
         if there is not None:
             return f"{bang}[{shown}]({os.path.relpath(there, Path(here).parent)}{anchor})"
         source = meant.relative_to(ROOT).as_posix()
+        if rust and (crate := source.removesuffix("/README.md")) in CRATES:
+            # Nothing that Sphinx knows of: it stands beside what Sphinx makes.
+            page = os.path.relpath(f"rust/{CRATES[crate]}/index.html", Path(here).parent)
+            return f'<a href="{page}">{html.escape(shown.replace("`", ""))}</a>'
         if REPOSITORY:
             return f"[{shown}]({REPOSITORY}/blob/main/{source})"
         return shown if source in shown else f"{shown} (`{source}`)"
@@ -131,7 +147,7 @@ def toctree(pages: Iterable[str], caption: str = "") -> str:
     return f"\n```{{toctree}}\n{options}\n" + "\n".join(pages) + "\n```\n"
 
 
-def write_pages(source: Path) -> None:
+def write_pages(source: Path, *, rust: bool) -> None:
     """The pages of docs/, and one for each family."""
     for path in sorted(DOCS.rglob("*")):
         if path.is_dir():
@@ -139,12 +155,12 @@ def write_pages(source: Path) -> None:
         there = source / path.relative_to(DOCS)
         there.parent.mkdir(parents=True, exist_ok=True)
         if path.suffix == ".md":
-            there.write_text(rewritten(path.read_text(encoding="utf-8"), path), encoding="utf-8")
+            there.write_text(rewritten(path.read_text(encoding="utf-8"), path, rust=rust), encoding="utf-8")
         else:
             shutil.copyfile(path, there)
     (source / "families").mkdir()
     for name in drivebus.profiles():
-        page = rewritten(family_page(name), ABOUT / name / "about.md")
+        page = rewritten(family_page(name), ABOUT / name / "about.md", rust=rust)
         (source / f"families/{name}.md").write_text(page, encoding="utf-8")
 
 
@@ -162,7 +178,7 @@ def write_reference(source: Path) -> None:
             if isinstance(getattr(drivebus, name), type) and not issubclass(getattr(drivebus, name), BaseException):
                 lines += ["   :inherited-members: str, int, tuple, dict, list"]
             lines += [""]
-        (source / f"reference/api-{at}.rst").write_text("\n".join(lines), encoding="utf-8")
+        (source / f"reference/api-{at:02}.rst").write_text("\n".join(lines), encoding="utf-8")
 
 
 def _directive(name: str) -> str:
@@ -181,10 +197,21 @@ def write_contents(source: Path) -> None:
         page.writelines(toctree(pages, caption) for caption, pages in CONTENTS)
     for name, folder in BELOW.items():
         index = source / f"{name}.md"
-        found = sorted(path for path in (source / folder).iterdir() if path.suffix in (".md", ".rst"))
+        found = [*sorted((source / folder).glob("*.rst")), *sorted((source / folder).glob("*.md"))]
         pages = [os.path.relpath(path, index.parent)[: -len(path.suffix)] for path in found if path != index]
         with index.open("a", encoding="utf-8") as page:
             page.write(toctree(pages))
+
+
+def foreign_files(site: Path) -> list[str]:
+    """What pages of the *site* would fetch from elsewhere: there must be nothing."""
+    found = []
+    for page in sorted(site.rglob("*")):
+        if page.suffix == ".html":
+            found += [f"{page.name}: {tag}" for tag in FETCHED.findall(page.read_text(encoding="utf-8"))]
+        elif page.suffix == ".css":
+            found += [f"{page.name}: {rule}" for rule in IMPORTED.findall(page.read_text(encoding="utf-8"))]
+    return found
 
 
 def main() -> int:
@@ -197,7 +224,7 @@ def main() -> int:
     source = TARGET / "site-source"
     shutil.rmtree(source, ignore_errors=True)
     source.mkdir(parents=True)
-    write_pages(source)
+    write_pages(source, rust=options.rust is not None)
     write_reference(source)
     write_contents(source)
     shutil.rmtree(options.out, ignore_errors=True)
@@ -205,6 +232,10 @@ def main() -> int:
     shutil.rmtree(doctrees, ignore_errors=True)
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "-d", str(doctrees)]
     ended = subprocess.run([*command, str(source), str(options.out)], check=False).returncode
+    foreign = foreign_files(options.out)
+    for each in foreign:
+        print(f"build_site.py: not a file of ours: {each}", file=sys.stderr)
+    ended = ended or int(bool(foreign))
     if ended == 0 and options.rust is not None:
         shutil.copytree(options.rust, options.out / "rust", dirs_exist_ok=True)
     if ended == 0:
