@@ -93,6 +93,9 @@ REFERENCE: Contents = [
 ]
 """Every public name, by what it is for: `check_names` holds this to `drivebus.__all__`."""
 
+ASYNCIO = ("asyncio", ["drivebus.aio.Bus", "drivebus.aio.Drive"])
+"""What is imported by itself."""
+
 
 def check_names() -> None:
     """Each public name stands in the reference, once."""
@@ -179,6 +182,12 @@ def write_reference(source: Path) -> None:
                 lines += ["   :inherited-members: str, int, tuple, dict, list"]
             lines += [""]
         (source / f"reference/api-{at:02}.rst").write_text("\n".join(lines), encoding="utf-8")
+
+    title, names = ASYNCIO
+    lines = [title, "=" * len(title), ""]
+    for name in names:
+        lines += [name, "-" * len(name), "", f".. autoclass:: {name}", "   :members:", "   :inherited-members:", ""]
+    (source / f"reference/api-{len(REFERENCE):02}.rst").write_text("\n".join(lines), encoding="utf-8")
 
 
 def _directive(name: str) -> str:

@@ -59,6 +59,16 @@ def family_page(name: str) -> str:
     return "\n\n".join(part.rstrip() for part in parts) + "\n"
 
 
+def _of_its_speed(profile: drivebus.Profile) -> str:
+    """What a start over the bus lacks if a speed is to come with it."""
+    setpoint = profile.role("setpoints.frequency")
+    if setpoint is None:
+        return "; no speed"
+    known = profile.describe(setpoint)
+    doubts = known.variant is not None and profile.variants()[known.variant].reason
+    return "; a speed with --unverified" if doubts or known.evidence != "verified" else ""
+
+
 def _from(name: str) -> str:
     """The way from what is written of a family to the page of all families."""
     return os.path.relpath(ROOT / "docs/families.md", ABOUT / name)
@@ -75,9 +85,11 @@ def _in_short(profile: drivebus.Profile) -> list[tuple[str, str]]:
     proved = {each for each in profile.commands() if profile.command_reason(each) is None}
     # Between the words of a start, the state has to be seen.
     is_seen = not profile.start_sequence() or profile.state_reason() is None
-    run = "yes" if "run_forward" in proved and proved & {"stop", "coast"} and is_seen else "with --unverified"
+    run = "yes" if "run_forward" in proved and proved & {"stop", "coast"} and is_seen else "--unverified"
     if "run_forward" not in profile.commands():
         run = "no"
+    elif run == "yes":
+        run += _of_its_speed(profile)
     kept = "each write may wear EEPROM"
     if memory is not None:
         kept = "RAM, or EEPROM with --store" + (" (unverified)" if memory.reason else "")

@@ -1,4 +1,5 @@
-//! Nothing of its own: the tests stand in `tests/`, and the examples of docs/rust.md and docs/developers/growing-types.md are tests here.
+//! Nothing of its own: the tests stand in `tests/`, and the examples of docs/rust.md and of
+//! docs/developers/growing-types.md are tests here.
 
 #[cfg(doctest)]
 mod may_grow;
