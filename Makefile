@@ -1,5 +1,5 @@
 # Every command of this project. People and CI run the same lines.
-# All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .venv-fuzz/, .venv-release/, .tools/, target/ and dist/.
+# All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .venv-docs/, .venv-fuzz/, .venv-release/, .tools/, target/ and dist/.
 
 PYTHON ?= python3
 TEST_JOBS ?= 4
@@ -26,7 +26,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
+.PHONY: help demo docs test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
         machine screens format schema types layers rust-lint rust-build rust-test counts counts-update python-collect python-test interop-parts examples wheel-smoke \
         pictures matrix semver sdist release-check release-readme archives publish-crates
 
@@ -34,8 +34,9 @@ help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
 	@echo "make test    sets everything up and runs every check"
 	@echo "make lint    format, clippy, rustdoc, ruff, mypy, pyright, stubtest, layers"
+	@echo "make docs    the documentation as a site with a search, in target/site"
 	@echo "make bench   the benchmarks; writes benches/RESULTS.md"
-	@echo "make conformance   other masters on the same hostile line; writes docs/conformance.md"
+	@echo "make conformance   other masters on the same hostile line; writes docs/developers/conformance.md"
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
 	@echo "make model   every state of the protocol core on every assumed line; each rule broken once"
 	@echo "make schedules   each wake-up at a bus left out once, which the search of orders of threads must notice"
@@ -205,8 +206,23 @@ matrix: $(VENV)/.dev $(VENV)/.wheel ## some minutes; see tests/python/matrix.py
 screens: $(VENV)/.dev $(VENV)/.wheel ## the screen of every command, in every window, as text in target/screens
 	DRIVEBUS_SCREENS=all $(PYTEST) -q tests/python/test_cli_screens.py
 
-conformance: $(PEERS)/.installed ## writes docs/conformance.md
-	$(PEERS)/bin/python -m tests.conformance.run $(if $(ONLY),--only $(ONLY),--out docs/conformance.md)
+conformance: $(PEERS)/.installed ## writes docs/developers/conformance.md
+	$(PEERS)/bin/python -m tests.conformance.run $(if $(ONLY),--only $(ONLY),--out docs/developers/conformance.md)
+
+DOCS_VENV := .venv-docs
+RUSTDOC   := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)/doc
+
+$(DOCS_VENV)/.installed: pyproject.toml dist/.wheel
+	$(PYTHON) -m venv --clear $(DOCS_VENV)
+	$(DOCS_VENV)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(DOCS_VENV)/bin/python -m pip install --quiet --group docs
+	$(DOCS_VENV)/bin/python -m pip install --quiet --force-reinstall dist/drivebus-*.whl
+	@touch $@
+
+# Once its tools are there, nothing of it needs a network: not the build, and not who reads the site.
+docs: $(DOCS_VENV)/.installed ## writes target/site
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc $(LOCKED) --quiet --no-deps $(PUBLISHED:%=--package %)
+	$(DOCS_VENV)/bin/python -m tools.build_site --rust $(RUSTDOC)
 
 # libFuzzer needs no nightly compiler: without a sanitizer its counters are plain code generation options. The memory
 # limit is the oracle of "bounded". What is found is kept out of the work tree until `make fuzz-corpus` chooses from it.
@@ -326,4 +342,4 @@ soak-realtime: $(VENV)/.wheel
 	$(BIN)/python tools/soak_realtime.py --minutes $(MINUTES) --seed $(SEED)
 
 clean: ## removes what was built and set up here
-	rm -rf $(VENV) $(PEERS) $(BENCH_PEERS) $(FUZZ_VENV) $(RELEASE) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) $(PEERS) $(BENCH_PEERS) $(DOCS_VENV) $(FUZZ_VENV) $(RELEASE) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks

@@ -68,7 +68,7 @@ UNSAFE_ALLOWED = {"crates/line/src/ports/tty/low_latency.rs", "crates/line/src/s
 # The rooms of the Python package, from the ground up: each may import those of the rows above its own.
 ROOMS: list[set[str]] = [
     {"advice"},
-    {"errors", "latch", "lazy_names", "attribute_mapping", "tables"},
+    {"end_signals", "errors", "latch", "lazy_names", "attribute_mapping", "tables"},
     {"values", "checks", "rtu"},
     {"strict_attributes", "look"},
     {"profile", "capture"},
@@ -117,6 +117,7 @@ USERS: dict[str, set[str]] = {
         "capture",
         "drivebus",
         "hal",
+        "end_signals",
         "latch",
         "lazy_names",
         "line",

@@ -1,8 +1,8 @@
 """Ends programs that run a motor, in every way and on each kind of port: who went on, and how long a stop took.
 
-`measure_ends.py --times 20 [--port socket …] [--only Ctrl-C …]`. The endings are those of `docs/ends.md`, and storms of
-2 to 20 Ctrl-C, at time-outs of 0.2 to 2 s, beside a thread that waits for a dead unit. Figures by the wall clock are
-for people: no test judges by them. Exit code 1 when a motor was left running.
+`measure_ends.py --times 20 [--port socket …] [--only Ctrl-C …]`. The endings are those of `docs/developers/ends.md`,
+and storms of 2 to 20 Ctrl-C, at time-outs of 0.2 to 2 s, beside a thread that waits for a dead unit. Figures by the
+wall clock are for people: no test judges by them. Exit code 1 when a motor was left running.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def main() -> int:
     parser.add_argument("--times", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--port", action="append", choices=PORTS)
-    parser.add_argument("--only", action="append", default=[], help=f"a row of docs/ends.md, or {STORM!r}")
+    parser.add_argument("--only", action="append", default=[], help=f"a row of docs/developers/ends.md, or {STORM!r}")
     given = parser.parse_args()
     dispositions_as_usual()
     ports = given.port or PORTS

@@ -54,8 +54,8 @@ class Bus(BusFace, Requests):
         timeout: Seconds to wait for an answer after the request has left.
         retries: How often a *read* is repeated after silence; a damaged answer, which took no time-out, counts half.
             Writes are never repeated, unless they can be read back: see `write`.
-        read_only: Refuse before it is sent every write, and bytes that have not the form of a read (`transact`): to a
-            unit that speaks another protocol they may be a command.
+        read_only: Refuse every write before it is sent, a stop too, and in `transact` all bytes that do not have the
+            form of a read: to a unit that speaks another protocol they may be a command.
         rs485: Direction control, for ports wired to a bare transceiver: `{"mode": "kernel"}` by the driver, `"rts"` by
             this program, `"auto"` by whichever can; with `rts_on_send`, `delay_before_ms`, `delay_after_ms`.
         echo: Whether the adapter hands back what it sends: `"auto"`, `"yes"` or `"no"`.
@@ -64,17 +64,16 @@ class Bus(BusFace, Requests):
             its last 32 answers, at least 100 ms, beside the time the characters take; never longer than *timeout*. The
             next read after silence waits the whole *timeout* again. What `poll` asks waits so in any case.
         low_latency: Whether an adapter that keeps what it receives (FTDI: 16 ms) is told to hurry while it is open.
-        queue: How many requests may wait for the line, 1..1000000. Who finds no room is told so at once (`NotAllowed`);
-            a stop always does.
-        share: Whether other programs of the same user may use the port at the same time: `"auto"`: who opens it first
-            has it and serves the others, who comes next uses it through that one; `"own"`: nobody is served where this
-            program has the port; `"never"`: nobody is served, and a port that another program has is busy. For serial
-            ports and `socket://`.
-        reserved: Whether what the specification reserves may be asked, by who knows that it is there: units 248 to 254
-            on a serial line, and writes to unit 0 over `tcp://`, which a gateway hands on to every unit behind it. Over
-            `tcp://` 0 can be read and 248 to 255 asked without it.
-        trace: A file that gets every frame of this bus, for Wireshark: pcapng, which it dissects as Modbus RTU without
-            a setting. A file that is there is replaced. None keeps nothing, and costs nothing.
+        queue: How many requests may wait for the line, 1..1000000. A full queue raises `NotAllowed` at once; a stop is
+            always accepted.
+        share: Whether other programs of the same user may use the port at the same time. `"auto"`: the first program to
+            open the port owns it and serves later ones, which go through it. `"own"`: as the owner it serves nobody.
+            `"never"`: it serves nobody, and a port that another program has is busy. For serial ports and `socket://`.
+        reserved: Whether addresses that the specification reserves may be asked: units 248 to 254 on a serial line, and
+            writes to unit 0 over `tcp://`, which a gateway hands on to every unit behind it. Without it, 0 can be read
+            and 248 to 255 asked over `tcp://`.
+        trace: A file that gets every frame of this bus, for Wireshark: pcapng, which it shows as Modbus RTU without a
+            setting. An existing file is replaced.
 
     Raises:
         NotAllowed: An argument is wrong; nothing was opened.

@@ -52,7 +52,7 @@ class Drive(BlockingFormerNames):
     and its confirmation are several requests, between which others may come.
 
     Attributes:
-        bus: The line it hangs on.
+        bus: The bus of its line.
         unit: Its address, 1..247.
         profile: What its words mean.
         unverified: Whether what no document of its family proves is done all the same, in every call.

@@ -288,7 +288,7 @@ class Unverified(NotAllowed):
 
 
 class WrongDrive(NotAllowed):
-    """What hangs at the address is another drive than the one that is meant, or may be; or a file is of another.
+    """Another drive than you mean is at the address, or may be; or a file is of another drive.
 
     Did the drive take it? No: what was asked was not sent.
     """

@@ -5,5 +5,5 @@ library, `worker` runs one of them in a process of its own, `child` is that proc
 the slave does and what is asked, `faults` puts the simulator's fault layer on the line, `run` runs all of it and
 `report` writes it down.
 
-    python -m tests.conformance.run --out docs/conformance.md
+    python -m tests.conformance.run --out docs/developers/conformance.md
 """

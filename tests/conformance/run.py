@@ -1,6 +1,6 @@
 """Runs every row against every library and writes the page.
 
-python -m tests.conformance.run --out docs/conformance.md
+python -m tests.conformance.run --out docs/developers/conformance.md
 python -m tests.conformance.run --only overtaken
 """
 

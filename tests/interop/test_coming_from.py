@@ -1,4 +1,4 @@
-"""The tables "Coming from …" of docs/api.md: each pair of calls asks the same of a drive."""
+"""The tables "Coming from …" of docs/coming-from.md: each pair of calls asks the same of a drive."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ from pymodbus.client import ModbusSerialClient
 import drivebus
 from drivebus.sim import Simulator
 
-PAGE = Path(__file__).resolve().parent.parent.parent / "docs/api.md"
-SECTION = "## Coming from minimalmodbus, pymodbus or python-can\n"
+PAGE = Path(__file__).resolve().parent.parent.parent / "docs/coming-from.md"
 
 
 def rows(begins: str) -> list[tuple[str, str]]:
     """The calls of the table whose left side begins so, and what they are here."""
-    page = PAGE.read_text(encoding="utf-8").partition(SECTION)[2]
+    page = PAGE.read_text(encoding="utf-8")
     row = re.compile(rf"^\| `({re.escape(begins)}[^`]*)`[^|]*\| `([^`]*)`", re.MULTILINE)
     # What is named only, with arguments left out, is not there to be called.
     return [(match[1], match[2]) for match in row.finditer(page) if "…" not in match[1]]
@@ -76,7 +75,7 @@ def test_there_are_rows() -> None:
 
 
 def test_what_is_named_here_is_there() -> None:
-    section = PAGE.read_text(encoding="utf-8").partition(SECTION)[2]
+    section = PAGE.read_text(encoding="utf-8")
     with drivebus.Bus("sim://gd350") as bus:
         names = {"drivebus": drivebus, "bus": bus, "drive": bus.drive(1)}
         for row in re.findall(r"^\|[^|]*\|([^|]*)\|$", section, re.MULTILINE):

@@ -1,4 +1,4 @@
-"""Every way in which a program may end while it runs a motor: the rows of docs/ends.md, as programs.
+"""Every way in which a program may end while it runs a motor: the rows of docs/developers/ends.md, as programs.
 
 Who judges looks at the drive: it was told to stop, or, where nobody is left to tell it, its own watchdog has acted.
 `tools/measure_ends.py` runs them many times, on each kind of port.

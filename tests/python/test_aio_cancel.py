@@ -24,7 +24,8 @@ STOP_FRAME = bytes.fromhex("01 06 20 00 00 05 42 09")
 # P00.10 to P00.12 and P01.20 of both units: answers of one length, of which only the value tells one from another.
 PLACES = [(unit, address) for unit in (1, 2) for address in (0x000A, 0x000B, 0x000C, 0x0114)]
 TASKS, ROUNDS = 40, 50
-# That a unit answers with as many words as it was asked for is assumed where answers come late (docs/architecture.md).
+# That a unit answers with as many words as it was asked for is assumed where answers come late
+# (docs/developers/architecture.md).
 BAD_LINE = {"all": 0.02, "short": 0.0, "long": 0.0}
 BAD_UNIT = {"all": 0.02, "late": 0.0, "overtaken": 0.0}
 

@@ -118,7 +118,8 @@ def test_over_a_bad_line_no_memory_is_written_twice(family: str, seed: int) -> N
             kept = bus.drive(1, family).backup()
         machine.factory_reset()
         machine.take_writes()
-        # What was asked on a bus that is closed by now is assumed to be answered in order (docs/architecture.md).
+        # What was asked on a bus that is closed by now is assumed to be answered in order
+        # (docs/developers/architecture.md).
         simulator.line.set_faults(all=0.006, overtaken=0.0)
         for _ in range(50):
             with Bus(simulator, timeout=0.25) as bus, suppress(drivebus.NoAnswer, drivebus.BadAnswer):

@@ -17,7 +17,7 @@ from .ends import DEAD, FORWARD, STOP, Line, line
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminal, and no signal but kill")
 
-PAGE = Path(__file__).parents[2] / "docs" / "ends.md"
+PAGE = Path(__file__).parents[2] / "docs" / "developers" / "ends.md"
 KINDS = ("serial.Serial", "spy", "rfc2217", "socket")
 ELSEWHERE = ("Ctrl-C", "SIGTERM, Ctrl-C ignored", "a handler of one's own that raises", "a daemon thread")
 BOTH = [

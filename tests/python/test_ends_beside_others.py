@@ -1,4 +1,4 @@
-"""Every row of docs/ends.md where the port is shared, and where the program has forked: no motor is left running.
+"""Each row of docs/developers/ends.md where the port is shared, and where the program has forked: no motor runs on.
 
 A real program on a pseudo-terminal, whose drive has a process and a motor of its own (`workshop`), ends in each of
 these ways: alone, as a guest of another program, as the one that has the port with a guest beside it, and with a child

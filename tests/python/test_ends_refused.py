@@ -1,4 +1,4 @@
-"""Every row of docs/ends.md at a drive that refuses to be halted at first: no motor is left running.
+"""Every row of docs/developers/ends.md at a drive that refuses to be halted at first: no motor is left running.
 
 Each exception from 01H to 0BH, for 0.02 to 5 s, which is within the ten seconds for which a halt is sent. Whose program
 stops the motor has its drive in its own process and in virtual time; what is left to another program is on a

@@ -151,7 +151,7 @@ def test_they_can_be_copied_and_sent_to_another_process(kind: type[NotAllowed]) 
 
 def test_the_reasons_of_not_ready_stand_alike_in_its_type_its_docstring_and_the_page() -> None:
     reasons = {word for word in get_args(Why) if word}
-    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/reference/python.md").read_text(encoding="utf-8")
     [row] = [line for line in page.splitlines() if line.startswith("| `NotReady` |")]
     for text in (row, drivebus.NotReady.__doc__ or ""):
         assert set(re.findall(r'"([a-z_]+)"', text)) == reasons

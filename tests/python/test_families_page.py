@@ -1,7 +1,7 @@
-"""docs/families.md keeps the counts that `drivebus profiles show` prints, and both agree with the CSV files.
+"""What is told of the families: the counts are those of the CSV files, and the pages have what the profiles say.
 
 The oracle reads the files plainly, and applies what docs/profiles.md says of what a sister family takes over. It shares
-no code with the package.
+no code with the package. `python -m tests.python.test_families_page` writes the table of docs/families.md anew.
 """
 
 from __future__ import annotations
@@ -9,13 +9,16 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from tools.family_pages import family_page
 
 import drivebus
 from drivebus.cli import cli
@@ -29,7 +32,8 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PROFILES = ROOT / "crates/drives/profiles"
 FAMILIES = sorted(path.name for path in PROFILES.iterdir() if path.is_dir())
 KINDS = ("registers", "parameters", "faults")
-BEGIN, END = "<!-- counts: kept by tests/python/test_families_page.py -->\n", "<!-- end of counts -->"
+PAGE = ROOT / "docs/families.md"
+BEGIN, END = "<!-- table: kept by tests/python/test_families_page.py -->\n", "<!-- end of the table -->"
 
 Row = dict[str, str]
 
@@ -137,33 +141,114 @@ DOCUMENTS = re.compile(
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_page_names_the_documents_of_each_family(family: str) -> None:
-    """Each document that the head of a profile names stands in the section of the family, by what it is found by."""
+def test_what_is_written_names_the_documents_of_each_family(family: str) -> None:
+    """Each document that the head of a profile names stands in its about.md, by what it is found by."""
     manifest = tomllib.loads((PROFILES / family / "profile.toml").read_text(encoding="utf-8"))
-    page = (ROOT / "docs/families.md").read_text(encoding="utf-8")
-    sections = [
-        text for text in re.split(r"^## ", page, flags=re.MULTILINE) if re.match(rf"(.* and )?{family}\b[: ]", text)
-    ]
-    assert len(sections) == 1, family
+    written = (PROFILES / family / "about.md").read_text(encoding="utf-8")
     documents = {number or name or order for number, name, order in DOCUMENTS.findall(manifest["source"])}
     assert documents
     # One that the GD350 manual lends is named there.
-    missing = {document for document in documents if document not in sections[0]} - {"2645"}
+    missing = {document for document in documents if document not in written} - {"2645"}
     assert missing == set()
 
 
-def test_the_page_has_the_counts() -> None:
-    lines = [
-        "| family | rows | total | with a source | without | unverified | assumed |",
-        "| --- | --- | ---: | ---: | ---: | ---: | ---: |",
+def says_what_it_is(family: str) -> str:
+    """What a simulated drive of the family is taken for by what it answers."""
+    with drivebus.Bus(f"sim://{family}?clock=virtual") as bus:
+        certainty = bus.identify(1).certainty
+    return {"certain": "yes", "shared": "yes, a shared code", "by answers": "by its answers", "unknown": "no"}[
+        certainty
     ]
-    for family in FAMILIES:
-        for kind, counts in shown(family).items():
-            lines.append(f"| `{family}` | {kind} | {' | '.join(str(number) for number in counts.values())} |")
-    table = "\n".join(lines) + "\n"
-    page = (ROOT / "docs/families.md").read_text(encoding="utf-8")
-    _, begin, rest = page.partition(BEGIN)
-    assert begin, f"docs/families.md lacks {BEGIN!r}"
-    now, end, _ = rest.partition(END)
-    assert end, f"docs/families.md lacks {END!r}"
-    assert now == table, f"docs/families.md must hold, between its markers:\n{table}"
+
+
+def may_run(family: str) -> str:
+    """Whether a motor is started: a start, and a stop or a coast, must be proved. Then, whether a speed is."""
+    profile = drivebus.Profile.builtin(family)
+    commands = profile.commands()
+    if "run_forward" not in commands:
+        return "no"
+    proved = {each for each in commands if profile.command_reason(each) is None}
+    starts = "run_forward" in proved and (not profile.start_sequence() or profile.state_reason() is None)
+    if not starts or not proved & {"stop", "coast"}:
+        return "`--unverified`"
+    setpoint = profile.role("setpoints.frequency")
+    if setpoint is None:
+        return "yes; no speed"
+    known = profile.describe(setpoint)
+    is_proved = known.evidence == "verified" and (known.variant is None or not profile.variants()[known.variant].reason)
+    return "yes" if is_proved else "yes; a speed with `--unverified`"
+
+
+def table() -> str:
+    lines = [
+        "| drive | profile | says what it is | run and stop | rows | proved |",
+        "| --- | --- | --- | --- | ---: | ---: |",
+    ]
+    for family in drivebus.profiles():
+        counts = [counted(rows) for rows in rows_of(family).values()]
+        total = sum(each["total"] for each in counts)
+        proved = total - sum(each["unverified"] + each["assumed"] for each in counts)
+        share = f"{100 * proved // total} %" if total else ""
+        about = os.path.relpath(PROFILES / family / "about.md", PAGE.parent)
+        title = f"[{drivebus.Profile.builtin(family).title}]({about})"
+        lines.append(f"| {title} | `{family}` | {says_what_it_is(family)} | {may_run(family)} | {total} | {share} |")
+    return "\n".join(lines) + "\n"
+
+
+def test_the_page_has_what_the_profiles_say() -> None:
+    kept = PAGE.read_text(encoding="utf-8").split(BEGIN)[1].split(END)[0]
+    assert kept == table(), "python -m tests.python.test_families_page"
+
+
+def answered(call: Callable[[], object]) -> str:
+    """Whether it is done, wants `unverified=True`, or is not known at all."""
+    try:
+        call()
+    except drivebus.Unverified:
+        return "unverified"
+    except drivebus.BadArgument:
+        return "not known"
+    except (drivebus.NotReady, drivebus.Unconfirmed):
+        # It obeys its keypad, or has to be set first: the question of proof comes before that.
+        pass
+    return "done"
+
+
+@pytest.mark.parametrize("family", [family for family in FAMILIES if may_run(family) != "no"])
+def test_a_motor_runs_where_the_page_says_so(family: str) -> None:
+    """What the table says of "run and stop", asked of a simulated drive."""
+    said = {
+        ("done", "done"): "yes",
+        ("done", "unverified"): "yes; a speed with `--unverified`",
+        ("done", "not known"): "yes; no speed",
+        ("unverified", "unverified"): "`--unverified`",
+    }
+    with drivebus.Bus(f"sim://{family}?clock=virtual") as bus:
+        drive = bus.drive(1, family)
+        started = answered(drive.run)
+        drive.prepare_control(store=drive.profile.memory() is None, unverified=True)
+        assert said[started, answered(lambda: drive.run(10.0))] == may_run(family)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_page_is_made_of_each_profile(family: str) -> None:
+    """The page of the site has what is written, each row, and the counts that `profiles show` prints."""
+    page = family_page(family)
+    title, _, written = (PROFILES / family / "about.md").read_text(encoding="utf-8").rstrip().partition("\n\n")
+    assert page.startswith(title)
+    assert f"\n\n{written}\n\n" in page
+    assert f"| run and stop | {may_run(family).replace('`', '')} |" in page
+    for kind, rows in rows_of(family).items():
+        body = page.partition(f"## {kind.capitalize()} of ")[2].partition("\n## ")[0]
+        made = [line for line in body.splitlines() if line.startswith("| ")][2:]
+        assert len(made) == len(rows), kind
+        for row in rows:
+            said = row.get("code") if kind != "registers" else row["name"]
+            assert any(re.search(rf"\| `?{re.escape(said or '')}`? \|", line) for line in made), said
+        numbers = " +".join(str(number) for number in shown(family)[kind].values())
+        assert re.search(rf"^{kind} +{numbers}$", page, re.MULTILINE)
+
+
+if __name__ == "__main__":
+    head, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
+    PAGE.write_text(head + BEGIN + table() + END + rest.split(END)[1], encoding="utf-8")

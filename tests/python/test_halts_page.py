@@ -1,4 +1,4 @@
-"""docs/halts.md has what the profiles say: which halts and resets do harm to which other families.
+"""docs/developers/halts.md has what the profiles say: which halts and resets do harm to which other families.
 
 `python -m tests.python.test_halts_page` writes the table anew. Whether it is true, the simulated drives say
 (`test_halts_of_other_families`); here it is only kept.
@@ -12,7 +12,7 @@ from pathlib import Path
 from drivebus import Profile, profiles, tables
 from drivebus.identify.harm import harmed
 
-PAGE = Path(__file__).resolve().parents[2] / "docs/halts.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs/developers/halts.md"
 BEGIN, END = "<!-- table: kept by tests/python/test_halts_page.py -->\n", "<!-- end of the table -->"
 COMMANDS = {"stop": "stop", "coast": "coast", "jog_stop": "end of a jog", "reset_fault": "reset"}
 

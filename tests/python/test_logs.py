@@ -34,7 +34,7 @@ def test_a_log_of_another_tool_gives_its_frames(tool: dict[str, Any]) -> None:
 
 def test_the_page_lists_what_is_tried() -> None:
     page = (
-        (ROOT / "docs/logs.md")
+        (ROOT / "docs/developers/log-forms.md")
         .read_text(encoding="utf-8")
         .partition("| tool | form | after |\n| --- | --- | --- |\n")[2]
     )

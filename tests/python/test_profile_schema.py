@@ -84,7 +84,7 @@ def test_a_mistake_of_shape_is_marked(what: str) -> None:
 
 
 def test_the_page_names_every_key() -> None:
-    page = (ROOT / "docs/profiles.md").read_text(encoding="utf-8").partition("\n### profile.toml\n")[2]
+    page = (ROOT / "docs/reference/profile-format.md").read_text(encoding="utf-8").partition("\n### profile.toml\n")[2]
     named = {word for quoted in re.findall(r"`([^`]+)`", page) for word in re.findall(r"[a-z_0-9]+", quoted)}
     assert named
     assert [key for key in sorted(set(keys(SCHEMA))) if key not in named] == []

@@ -17,7 +17,11 @@ import drivebus
 from drivebus.cli import cli
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+    *sorted((ROOT / "crates/drives/profiles").glob("*/about.md")),
+]
 
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 NAME = re.compile(r"\bdrivebus\.(?!toml|cli|hal\b|com\b)[a-z]+\.[A-Za-z]\w+")
@@ -31,7 +35,7 @@ def blocks() -> list[object]:
         text = page.read_text(encoding="utf-8")
         for match in BLOCK.finditer(text):
             line = text.count("\n", 0, match.start(1)) + 1
-            found.append(pytest.param(match[1], id=f"{page.name}:{line}"))
+            found.append(pytest.param(match[1], id=f"{page.relative_to(ROOT)}:{line}"))
     return found
 
 
@@ -67,14 +71,14 @@ def test_the_readme_is_the_first_block() -> None:
 
 
 def test_cli_page_names_every_command() -> None:
-    page = (ROOT / "docs/cli.md").read_text(encoding="utf-8").partition("\n## ")[0]
+    page = (ROOT / "docs/commands.md").read_text(encoding="utf-8").partition("\n## ")[0]
     rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
     named = {word for row in rows for word in re.findall(r"`([a-z]+)", row)}
     assert named == set(cli.commands)
 
 
 def test_api_page_names_what_there_is() -> None:
-    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/reference/python.md").read_text(encoding="utf-8")
     for section, owner in (("## Bus", drivebus.Bus), ("## Drive", drivebus.Drive)):
         part = page.partition(section)[2].partition("\n## ")[0]
         for row in (line.split("|")[1] for line in part.splitlines() if line.startswith("| `")):

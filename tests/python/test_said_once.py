@@ -18,7 +18,7 @@ import drivebus
 
 VERSION, ADDRESS = project()
 
-MEASURED = {"benches/RESULTS.md", "docs/conformance.md"}
+MEASURED = {"benches/RESULTS.md", "docs/developers/conformance.md"}
 """Pages that say which version was measured."""
 MAY_SAY = {"Cargo.toml", "Cargo.lock", "CHANGELOG.md", *MEASURED}
 

@@ -101,7 +101,7 @@ def test_every_profile_has_a_simulated_drive() -> None:
 
 
 def test_the_documentation_has_a_row_for_every_family() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "simulator.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "developers" / "simulator.md").read_text(encoding="utf-8")
     table = page.partition("## The families")[2].partition("\n## ")[0]
     named = [
         name for line in table.splitlines() if line.startswith("| `") for name in line.split("|")[1].split("`")[1::2]

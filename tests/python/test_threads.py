@@ -17,7 +17,8 @@ from drivebus import Bus, Simulator
 
 THREADS = 8
 READS = 1000
-# That a unit answers with as many words as it was asked for is assumed where answers come late (docs/architecture.md).
+# That a unit answers with as many words as it was asked for is assumed where answers come late
+# (docs/developers/architecture.md).
 BAD_LINE = {"all": 0.02, "short": 0.0, "long": 0.0}
 BAD_UNIT = {"all": 0.02, "late": 0.0, "overtaken": 0.0}
 # P00.10 to P00.12 and P01.20, in both units: answers of one length, of which only the value tells one from another.

@@ -7,9 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from drivebus.operations.program_end import END_SIGNALS as ENDS
-
-__all__ = ["ENDS", "heeded"]
+__all__ = ["heeded"]
 
 
 @contextmanager

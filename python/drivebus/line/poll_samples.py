@@ -59,7 +59,7 @@ class PolledDrive(Protocol):
 
     @property
     def bus(self) -> object:
-        """The line it hangs on."""
+        """The line that it is on."""
 
     @property
     def unit(self) -> int:

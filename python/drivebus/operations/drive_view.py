@@ -19,7 +19,7 @@ class DriveView:
     """One drive as one call sees it. Another bus or more trust make another view of the same record.
 
     Attributes:
-        bus: The line it hangs on.
+        bus: The bus of its line.
         address: 1..247.
         evidence: Its profile, under one trust.
         record: What the line knows of it.

@@ -113,9 +113,9 @@ async def stop(unit: DriveView, *, confirm: float = 1.0, within: float = WITHIN,
     """Stops the motor as the drive is set to stop it, usually by a ramp. Sent at once, whatever the state is.
 
     Returns after half a second and a hertz of the drive's own ramp, where the motor ran at its setpoint and only
-    the bus tells it what to do (docs/safety.md has the rule); else when the drive is stopped. `wait_until_stopped`
-    waits for that in any case. Where the family has no state that may be used, returns when the drive has confirmed
-    the command.
+    the bus tells it what to do (docs/developers/guarantees.md has the rule); else when the drive is stopped.
+    `wait_until_stopped` waits for that in any case. Where the family has no state that may be used, returns when the
+    drive has confirmed the command.
 
     A frequency that falls is looked at beyond *confirm*: for as long as it falls, and a minute at most, or where
     the drive's ramp is known half as long again as that takes. A drive that tells none is looked at for *confirm*.
@@ -143,9 +143,9 @@ async def stop(unit: DriveView, *, confirm: float = 1.0, within: float = WITHIN,
 
 
 async def coast(unit: DriveView, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
-    """Switches the output off: the motor turns on until friction stops it. Arguments and errors as for `stop`.
+    """Switches the output off: the motor freewheels to a stop. Arguments and errors as for `stop`.
 
-    Returns when the drive is stopped: what coasts has no ramp.
+    Returns when the drive reports that it is stopped: a coast has no ramp.
     """
     await _halt(unit.trusting(unverified), "coast", confirm, within)
 

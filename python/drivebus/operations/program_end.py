@@ -22,14 +22,12 @@ from contextvars import ContextVar
 from types import FrameType
 
 from drivebus._native import begin_of_child, end_of_program
+from drivebus.end_signals import END_SIGNALS
 from drivebus.errors import NotAllowed, NotReady
 from drivebus.latch import Latch
 from drivebus.operations.deferred_signals import DeferredSignals
 
-__all__ = ["END_SIGNALS", "Guard", "before_start", "end_over"]
-
-END_SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
-"""What ends a process at once unless somebody listens: asked to end, its terminal closed, and Ctrl-Break on Windows."""
+__all__ = ["Guard", "before_start", "end_over"]
 
 _PATIENCE = 10.0
 """Seconds for which a start that is on its way is waited for, so that the stop comes after it."""

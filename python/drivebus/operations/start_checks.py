@@ -2,7 +2,7 @@
 
 Every start goes through here, whatever asks for it: `motion` for run and jog, of both faces, of the command line, the
 panel and HAL; `bit_words` for bits that may start one. A new reason against a start is a check in `ready_to_start`, its
-word in `errors.Why`, and a line in docs/safety.md.
+word in `errors.Why`, and a line in docs/developers/guarantees.md.
 """
 
 from __future__ import annotations

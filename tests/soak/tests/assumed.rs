@@ -18,7 +18,7 @@ fn each_assumption_is_one_of_the_model_or_of_the_soak_or_said_to_be_neither() {
 
 #[test]
 fn the_documents_tell_the_same() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/architecture.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/developers/architecture.md");
     let text = fs::read_to_string(path).unwrap();
     let (_, section) = text.split_once("\nWhat is assumed,").unwrap();
     let told: Vec<&str> =

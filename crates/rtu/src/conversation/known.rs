@@ -7,7 +7,6 @@ use super::first_contact::Put;
 use super::fresh_words::FreshWords;
 use super::longer_reads::Longer;
 use super::probes::{Probe, Tried};
-use super::two_parts;
 use super::units::Units;
 use crate::{Attribution, Destination, Instant, Master, Patience, Request, SerialFormat, Table, Tally, UnitAddress};
 
@@ -282,7 +281,7 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
             return Next::AskApart(count);
         }
         let in_two = if apart && may_be_mistaken && !self.others {
-            two_parts::parts(&self.longer, &self.master, now, unit, &ask.request)
+            self.longer.parts(&self.master, now, unit, &ask.request)
         } else {
             None
         };

@@ -1,4 +1,4 @@
-//! Reads in a longer form: a few words more than were asked for, so that no open answer could pass for theirs.
+//! Reads put so that no open answer could pass for theirs: a few words more than were asked for, or two shorter ones.
 //!
 //! An answer carries no number, but it has a length. Where a late answer could be taken for the one to a read, the read
 //! asks for the next registers too, and what was not asked for is cut off. Not every unit has a register there, and none
@@ -80,6 +80,25 @@ impl<const N: usize> Longer<N> {
         is_given && (master.tells_apart(now, unit, read) || has_another_length(master, now, unit, read))
     }
 
+    /// How many words the two parts of `request` have, the first one and the last, so that the answers of `unit` can be no others';
+    /// none where there are no such.
+    pub(super) fn parts(
+        &self,
+        master: &Master,
+        now: Instant,
+        unit: UnitAddress,
+        request: &Request<'_>,
+    ) -> Option<(u16, u16)> {
+        let count = match *request {
+            Request::Read { table, count, .. } if !table.is_bits() => count,
+            _ => return None,
+        };
+        (2..count).rev().map(|first| (first, count + 1 - first)).find(|&(first, last)| {
+            let is_apart = |part: Option<Request<'_>>| part.is_some_and(|part| self.is_apart(master, now, unit, &part));
+            first != last && is_apart(first_part(request, first)) && is_apart(last_part(request, last))
+        })
+    }
+
     /// The reads of so many words as `request` asks for, and of more, that `unit` was not heard to refuse.
     pub(super) fn lengths<'r>(
         &self,
@@ -147,6 +166,19 @@ impl<const N: usize> Longer<N> {
             *kept = Some(((unit, place), limit));
         }
     }
+}
+
+/// The last `last` words of `request`; none if it has no more.
+pub(super) fn last_part<'r>(request: &Request<'_>, last: u16) -> Option<Request<'r>> {
+    let &Request::Read { table, address, count, .. } = request else { return None };
+    let before = count.checked_sub(last).filter(|&before| before > 0)?;
+    Request::read_of(table, address.checked_add(before)?, last).ok()
+}
+
+/// The first `first` words of `request`; none if it has no more.
+pub(super) fn first_part<'r>(request: &Request<'_>, first: u16) -> Option<Request<'r>> {
+    let &Request::Read { table, address, count, .. } = request else { return None };
+    Request::read_of(table, address, first).ok().filter(|_| first < count)
 }
 
 /// Whether `read` asks for another number of words than everything open has, of a unit that answers in order.

@@ -6,10 +6,10 @@
 
 use super::exchange::Purpose;
 use super::known::{Ask, Known};
-use super::longer_reads::Longer;
+use super::longer_reads::{first_part, last_part};
 use super::outcome::{Slip, Times};
 use super::{Conversation, State};
-use crate::{Instant, Master, Request, UnitAddress};
+use crate::Instant;
 
 /// So often the word in common may have changed in between before the question is put as it is.
 const CHANGES: u8 = 3;
@@ -19,38 +19,6 @@ const CHANGES: u8 = 3;
 pub(super) struct Begun {
     pub(super) last: u16,
     pub(super) sent: Instant,
-}
-
-/// The last `last` words of `request`; none if it has no more.
-pub(super) fn last_part<'r>(request: &Request<'_>, last: u16) -> Option<Request<'r>> {
-    let &Request::Read { table, address, count, .. } = request else { return None };
-    let before = count.checked_sub(last).filter(|&before| before > 0)?;
-    Request::read_of(table, address.checked_add(before)?, last).ok()
-}
-
-/// The first `first` words of `request`; none if it has no more.
-pub(super) fn first_part<'r>(request: &Request<'_>, first: u16) -> Option<Request<'r>> {
-    let &Request::Read { table, address, count, .. } = request else { return None };
-    Request::read_of(table, address, first).ok().filter(|_| first < count)
-}
-
-/// How many words the two parts of `request` have, the first one and the last, so that the answers of `unit` can be no others';
-/// none where there are no such.
-pub(super) fn parts<const N: usize>(
-    longer: &Longer<N>,
-    master: &Master,
-    now: Instant,
-    unit: UnitAddress,
-    request: &Request<'_>,
-) -> Option<(u16, u16)> {
-    let count = match *request {
-        Request::Read { table, count, .. } if !table.is_bits() => count,
-        _ => return None,
-    };
-    (2..count).rev().map(|first| (first, count + 1 - first)).find(|&(first, last)| {
-        let is_apart = |part: Option<Request<'_>>| part.is_some_and(|part| longer.is_apart(master, now, unit, &part));
-        first != last && is_apart(first_part(request, first)) && is_apart(last_part(request, last))
-    })
 }
 
 impl<'r> Conversation<'r> {

@@ -104,7 +104,7 @@ def _stopped(session: Session, drive: drivebus.Drive, wait: float | None) -> Non
 @within_option
 @each_drive
 def coast(session: Session, within: float) -> None:
-    """Switch the output off: the motor turns on until friction stops it. Does not ask first."""
+    """Switch the output off: the motor freewheels to a stop. Does not ask first."""
     session.will_write()
     with session.bus() as bus:
         drive = session.halt(bus, "coast", lambda drive: drive.coast(within=within))

@@ -18,7 +18,8 @@ from drivebus.cli.option_types import Place, Seconds, Size, Whole
 from drivebus.cli.present.output import counted, printable, remark
 from drivebus.cli.present.recordings import Recorded
 from drivebus.cli.session import Session, pass_session
-from drivebus.cli.signals import ENDS, heeded
+from drivebus.cli.signals import heeded
+from drivebus.end_signals import END_SIGNALS
 from drivebus.record.formats import format_of
 
 __all__ = ["COMMANDS"]
@@ -91,7 +92,7 @@ def record(
         if not out.live:
             out.remark(f"Recording {counted(len(drives), 'drive')} into {target}. Ctrl-C ends it.")
         try:
-            with heeded(ENDS, _end), ExitStack() as live:
+            with heeded(END_SIGNALS, _end), ExitStack() as live:
                 if out.live:
                     live.enter_context(Live(shown, console=out.console, refresh_per_second=1 / _EACH, transient=True))
                 while not recorder.wait(_EACH):

@@ -21,7 +21,8 @@ from drivebus.cli.present.exchanges import Filter, Lines
 from drivebus.cli.present.output import counted, remark
 from drivebus.cli.present.sniff_table import SniffTable
 from drivebus.cli.session import EXAMPLE_PORT, Session, pass_session
-from drivebus.cli.signals import ENDS, heeded
+from drivebus.cli.signals import heeded
+from drivebus.end_signals import END_SIGNALS
 from drivebus.sniffer import Exchange, Families, Figures
 
 __all__ = ["COMMANDS"]
@@ -131,7 +132,7 @@ def _ended_by_signals(stop: threading.Event) -> AbstractContextManager[None]:
         stop.set()
 
     # What is ignored, as under nohup, stays so.
-    heard = [each for each in (signal.SIGINT, *ENDS) if signal.getsignal(each) not in (signal.SIG_IGN, None)]
+    heard = [each for each in (signal.SIGINT, *END_SIGNALS) if signal.getsignal(each) not in (signal.SIG_IGN, None)]
     return heeded(heard, end)
 
 

@@ -22,7 +22,8 @@ from drivebus.cli.panel.members import Member, opened
 from drivebus.cli.panel.motors import stop_all, wait_for_all
 from drivebus.cli.present.output import remark
 from drivebus.cli.session import Session
-from drivebus.cli.signals import ENDS, heeded
+from drivebus.cli.signals import heeded
+from drivebus.end_signals import END_SIGNALS
 
 __all__ = ["Ended", "run"]
 
@@ -123,7 +124,7 @@ def _heeding_signals(app: Panel, ended: Ended) -> Iterator[None]:
             # Not `threading`: its locks may be held by what this signal interrupted.
             _thread.start_new_thread(end, ())
 
-    with heeded((signal.SIGINT, *ENDS), on_signal):
+    with heeded((signal.SIGINT, *END_SIGNALS), on_signal):
         try:
             yield
         finally:

@@ -18,10 +18,10 @@ from drivebus.cli.option_types import Place, Whole
 from drivebus.cli.present.help_format import Listing
 from drivebus.cli.present.output import Output, remark
 from drivebus.cli.session import Session, pass_session
-from drivebus.cli.signals import ENDS
 from drivebus.cli.sim.control_commands import Orders, in_words
 from drivebus.cli.sim.control_socket import open_to_orders
 from drivebus.cli.sim.rates import rates_of
+from drivebus.end_signals import END_SIGNALS
 from drivebus.latch import Latch
 
 __all__ = ["sim"]
@@ -118,7 +118,7 @@ def sim(
         ear=False if ear is None else ear or True,
     )
     # Whoever ends it, the link goes with it.
-    for number in ENDS:
+    for number in END_SIGNALS:
         signal.signal(number, signal.default_int_handler)
     with simulator:
         if simulator.transport == "process":
