@@ -557,13 +557,6 @@ BREAKS = [
         "overtaking --requests 4",
     ),
     Break(
-        "the first part of a read has a length that nothing open has",
-        LONGER,
-        "is_apart(first_part(request, first)) && is_apart",
-        "is_apart",
-        "overtaking-sixteen --requests 6",
-    ),
-    Break(
         "a write waits until nothing open could confirm it",
         KNOWN,
         "Attribution::Wait(until) => Next::Overtaken(until),",
