@@ -81,6 +81,7 @@ $(VENV)/.dev: pyproject.toml $(VENV)/.created
 dist/.wheel: $(RUST_SOURCES) $(PYTHON_SOURCES) $(VENV)/.created
 	@mkdir -p dist && rm -f dist/drivebus-*.whl
 	$(BIN)/maturin build --release $(LOCKED) --interpreter $(BIN)/python --out dist
+	$(BIN)/python tools/settle_wheel.py dist/drivebus-*.whl
 	@touch $@
 
 # Tests run against the wheel, so what is tested is what is shipped, and Rust is built for release once.
