@@ -29,6 +29,7 @@ def environment(folder: Path, *, from_source: bool) -> dict[str, str]:
         "PATH": os.pathsep.join([str(SYSTEM / "bin"), str(ROOT / ".venv-wheels" / "bin"), os.environ["PATH"]]),
         "LD_LIBRARY_PATH": str(SYSTEM / "lib" / "x86_64-linux-gnu"),
         "CARGO_TARGET_DIR": str(folder),
+        "CARGO_INCREMENTAL": "0",
         "CARGO_BUILD_JOBS": os.environ.get("CARGO_BUILD_JOBS", "2"),
         "CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER": MINGW,
     }
