@@ -142,7 +142,8 @@ def run(target: Target, wheel: Path) -> str:
     elif not target.is_native:
         return ""
     subprocess.run(command, check=True)
-    return f"CPython 3.11 under {target.python.emulator}" if target.python else "this Python"
+    own = f"CPython {sys.version_info.major}.{sys.version_info.minor}"
+    return f"CPython 3.11 under {target.python.emulator}" if target.python else own
 
 
 def make(target: Target, *, twice: bool, runs: bool) -> str:

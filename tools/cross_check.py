@@ -12,6 +12,7 @@ import subprocess
 import sys
 
 from tools import cross
+from tools.settle_wheel import ROOT
 
 SYSTEMS = ("x86_64-pc-windows-gnu", "aarch64-apple-darwin")
 PUBLISHED = ("drivebus-rtu", "drivebus-line", "drivebus-drives", "drivebus-sim", "drivebus")
@@ -19,13 +20,13 @@ PUBLISHED = ("drivebus-rtu", "drivebus-line", "drivebus-drives", "drivebus-sim",
 
 def check(system: str) -> bool:
     """Whether all compiles for `system`."""
-    environ = cross.environment(cross.ROOT / "target" / "cross", from_source=True)
+    environ = cross.environment(ROOT / "target" / "cross", from_source=True)
     # Of the crates here alone, and not of the standard library.
     environ |= {"CARGO_BUILD_WARNINGS": "deny", "CARGO_UNSTABLE_WARNINGS": "true"}
     cargo = [str(cross.SYSTEM / "bin" / "cargo"), "check", "--locked", "--quiet", "--target", system]
     crates = [word for crate in PUBLISHED for word in ("--package", crate)]
     commands = [[*cargo, *crates, "--all-targets"], [*cargo, "--package", "drivebus-python"]]
-    return all(subprocess.run(command, cwd=cross.ROOT, env=environ).returncode == 0 for command in commands)
+    return all(subprocess.run(command, cwd=ROOT, env=environ).returncode == 0 for command in commands)
 
 
 def main() -> None:
