@@ -1,5 +1,5 @@
 # Every command of this project. People and CI run the same lines.
-# All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .venv-docs/, .venv-fuzz/, .venv-release/, .tools/, target/ and dist/.
+# All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .venv-docs/, .venv-fuzz/, .venv-release/, .venv-wheels/, .tools/, target/ and dist/.
 
 PYTHON ?= python3
 TEST_JOBS ?= 4
@@ -28,7 +28,7 @@ RUST_TESTED := --workspace --exclude drivebus-python
 .DELETE_ON_ERROR:
 .PHONY: help demo docs test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
         machine screens format schema types layers rust-lint rust-build rust-test counts counts-update python-collect python-test interop-parts examples wheel-smoke \
-        pictures matrix semver sdist release-check release-readme archives publish-crates
+        pictures matrix semver sdist release-check release-readme archives publish-crates wheels cross-check
 
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
@@ -48,6 +48,8 @@ help: ## what can be made
 	@echo "make oldest  somebody's Rust program with the oldest versions of what the crates need"
 	@echo "make pictures   the pictures of the README, from what the commands show"
 	@echo "make wheel   the wheel, in dist/"
+	@echo "make wheels  the wheels of other systems, in dist/wheels/: make wheels ONLY=aarch64"
+	@echo "make cross-check   whether the crates compile for Windows and macOS"
 	@echo "make clean   removes what was built and set up here"
 	@echo
 	@echo "Parts: format types layers rust-lint rust-test counts python-test examples wheel-smoke"
@@ -85,6 +87,7 @@ $(VENV)/.dev: pyproject.toml $(VENV)/.created
 dist/.wheel: $(RUST_SOURCES) $(PYTHON_SOURCES) $(VENV)/.created
 	@mkdir -p dist && rm -f dist/drivebus-*.whl
 	$(BIN)/maturin build --release $(LOCKED) --interpreter $(BIN)/python --out dist
+	$(BIN)/python tools/settle_wheel.py dist/drivebus-*.whl
 	@touch $@
 
 # Tests run against the wheel, so what is tested is what is shipped, and Rust is built for release once.
@@ -268,6 +271,21 @@ fuzz-corpus: $(FUZZ_NEEDS) ## adds what reaches code that nothing in fuzz/corpus
 	    $$run fuzz/corpus/$$target $(FUZZ_FOUND)/$$target $$then -merge=1 -use_counters=0; \
 	done
 
+# What is for other systems is built by a compiler of its own, which needs Debian 12.
+WHEELS_VENV := .venv-wheels
+
+$(WHEELS_VENV)/.installed: pyproject.toml | machine
+	$(PYTHON) -m venv --clear $(WHEELS_VENV)
+	$(WHEELS_VENV)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(WHEELS_VENV)/bin/python -m pip install --quiet --group wheels
+	@touch $@
+
+wheels: $(WHEELS_VENV)/.installed ## some minutes each; see tools/build_wheels.py
+	$(WHEELS_VENV)/bin/python -m tools.build_wheels $(ONLY)
+
+cross-check: ## some minutes the first time; see tools/cross_check.py
+	$(PYTHON) -m tools.cross_check
+
 # Every wake-up of the queue left out once in a copy, which `make rust-test`'s search of orders of threads must notice.
 schedules: $(VENV)/.created ## some minutes; see tests/schedules/README.md
 	$(BIN)/python tools/check_schedules.py
@@ -342,4 +360,4 @@ soak-realtime: $(VENV)/.wheel
 	$(BIN)/python tools/soak_realtime.py --minutes $(MINUTES) --seed $(SEED)
 
 clean: ## removes what was built and set up here
-	rm -rf $(VENV) $(PEERS) $(BENCH_PEERS) $(DOCS_VENV) $(FUZZ_VENV) $(RELEASE) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) $(PEERS) $(BENCH_PEERS) $(DOCS_VENV) $(FUZZ_VENV) $(RELEASE) $(WHEELS_VENV) .tools dist target .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks

@@ -25,6 +25,7 @@ enum Server {
 }
 
 impl Server {
+    #[cfg_attr(not(unix), expect(unused_variables, reason = "only Unix has ports to serve"))]
     fn start(simulator: &sim::Simulator, transport: &str, link: Option<PathBuf>) -> PyResult<Self> {
         let failed = |error| sim_error(&format!("simulator ({transport})"), error);
         if link.is_some() && transport != "pty" {

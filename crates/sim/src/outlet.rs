@@ -18,6 +18,7 @@ pub(crate) trait Outlet: Send + Sync + Debug {
 pub(crate) struct Outlets(Mutex<Vec<Weak<dyn Outlet>>>);
 
 impl Outlets {
+    #[cfg(unix)]
     pub(crate) fn add(&self, outlet: &Arc<impl Outlet + 'static>) {
         let weak: Weak<dyn Outlet> = Arc::<_>::downgrade(outlet) as Weak<dyn Outlet>;
         let mut outlets = self.lock();

@@ -15,6 +15,8 @@ use crate::ports::closing::Closing;
 use crate::system::clock::{monotonic, sleep_until};
 use crate::system::inherited::Kept;
 
+mod unconfirmed;
+
 /// How long after its answer a server closes that closes because of it.
 const SOON: Duration = Duration::from_secs(1);
 
@@ -31,13 +33,6 @@ const REFUSED_PAUSE: Duration = Duration::from_millis(10);
 /// How long the network may take no byte of what it is given before the connection counts as lost.
 const STALL: Duration = Duration::from_millis(80);
 
-/// How long what was sent may stay unconfirmed before the connection counts as lost.
-///
-/// Without it the system keeps on trying for a quarter of an hour, and a server that is reached again then gets every
-/// request of that time at once, commands that nobody wants any more among them.
-#[cfg(target_os = "linux")]
-const UNCONFIRMED: Duration = Duration::from_secs(3);
-
 /// One connection after the other to one server.
 #[derive(Debug)]
 pub(crate) struct Connection {
@@ -48,6 +43,8 @@ pub(crate) struct Connection {
     pub(crate) address: SocketAddr,
     timeout: Duration,
     closing: Closing,
+    /// Whether the system gives up what stays unconfirmed.
+    ends_in_time: bool,
     /// Whether a request went over it; whether it was looked at since the last bytes went or came.
     is_used: bool,
     pub(crate) is_ready: bool,
@@ -83,13 +80,14 @@ impl Connection {
         let mut failure = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
         for address in addresses {
             match TcpStream::connect_timeout(&address, timeout).and_then(prepared) {
-                Ok(stream) => {
+                Ok((stream, ends_in_time)) => {
                     return Ok(Self {
                         stream: Kept::new(stream),
                         name,
                         address,
                         timeout,
                         closing: closing.clone(),
+                        ends_in_time,
                         is_used: false,
                         is_ready: false,
                         came: Vec::new(),
@@ -147,10 +145,11 @@ impl Connection {
                 made => break made,
             }
         };
-        let stream = stream.map_err(|error| {
+        let (stream, ends_in_time) = stream.map_err(|error| {
             self.lost(format_args!("the other side closed it behind its answer, and takes no other one ({error})"))
         })?;
         self.stream = Kept::new(stream);
+        self.ends_in_time = ends_in_time;
         (self.is_used, self.is_ready, self.answered) = (false, true, None);
         self.came.clear();
         self.renewed += 1;
@@ -242,15 +241,23 @@ impl Connection {
         PortError::new(PortErrorKind::Lost, &self.name, message)
     }
 
-    /// What people should know about the server.
-    pub(crate) fn note(&self) -> Option<String> {
-        (self.renewed > 0).then(|| {
+    /// What people should know about the server, and about this system.
+    pub(crate) fn notes(&self) -> Vec<String> {
+        let renews = (self.renewed > 0).then(|| {
             format!(
                 "{} closes the connection behind each answer, so each request gets one of its own; set the server to keep it \
                  open, which is faster",
                 self.name
             )
-        })
+        });
+        let arrives_late = (!self.ends_in_time).then(|| {
+            format!(
+                "{}: this system cannot be told when to give up what it could not hand over; after a failure of the network, \
+                 old requests may arrive late",
+                self.name
+            )
+        });
+        renews.into_iter().chain(arrives_late).collect()
     }
 }
 
@@ -259,13 +266,13 @@ fn is_soon(moment: Instant) -> bool {
     monotonic().saturating_duration_since(moment) <= SOON
 }
 
-/// Each write leaves at once, and none blocks for long. Reads wait on our own clock first.
-fn prepared(stream: TcpStream) -> io::Result<TcpStream> {
+/// Each write leaves at once, and none blocks for long. Reads wait on our own clock first. Whether what stays unconfirmed is
+/// given up, too.
+fn prepared(stream: TcpStream) -> io::Result<(TcpStream, bool)> {
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(STALL))?;
-    #[cfg(target_os = "linux")]
-    rustix::net::sockopt::set_tcp_user_timeout(&stream, u32::try_from(UNCONFIRMED.as_millis()).unwrap_or(u32::MAX))?;
-    Ok(stream)
+    let ends_in_time = unconfirmed::give_up(&stream)?;
+    Ok((stream, ends_in_time))
 }
 
 /// Whether there is something to read, the end included, before `until`.

@@ -107,8 +107,15 @@ mod names {
         if is_pseudo_terminal(number) { format!("port-{file_system:x}-{number:x}") } else { format!("port-{number:x}") }
     }
 
+    #[cfg(target_os = "linux")]
     fn is_pseudo_terminal(number: u64) -> bool {
-        (136..=143).contains(&rustix::fs::major(number)) || !cfg!(target_os = "linux")
+        (136..=143).contains(&rustix::fs::major(number))
+    }
+
+    /// Elsewhere the numbers do not tell.
+    #[cfg(not(target_os = "linux"))]
+    fn is_pseudo_terminal(_number: u64) -> bool {
+        true
     }
 
     /// The server at the other end of a connection to `address`.
@@ -135,6 +142,7 @@ mod names {
 mod tests {
     #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
+    #[cfg(target_os = "linux")]
     use std::net::TcpListener;
 
     use super::*;

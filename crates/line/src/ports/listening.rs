@@ -23,7 +23,7 @@ pub(crate) fn listening(_ip: IpAddr, _port: u16) -> Option<u64> {
 
 /// Who listens at the address itself goes before who listens at all of them. Several may share a port: the first stands for
 /// them.
-#[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux has such tables"))]
+#[cfg_attr(not(any(target_os = "linux", test)), expect(dead_code, reason = "only Linux has such tables"))]
 fn of_tables(tcp: &str, tcp6: &str, ip: IpAddr, port: u16) -> Option<u64> {
     let at = |table: &str, wanted: &str| table.lines().filter_map(|line| listener(line, wanted, port)).min();
     match ip {

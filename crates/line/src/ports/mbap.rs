@@ -224,6 +224,6 @@ impl Line for ModbusTcp {
             0 => None,
             count => Some(format!("answers with another transaction than asked, dropped: {count}")),
         };
-        dropped.into_iter().chain(self.connection.note()).collect()
+        dropped.into_iter().chain(self.connection.notes()).collect()
     }
 }

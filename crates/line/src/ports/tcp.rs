@@ -93,6 +93,6 @@ impl Line for RtuOverTcp {
     }
 
     fn notes(&self) -> Vec<String> {
-        self.connection.note().into_iter().collect()
+        self.connection.notes()
     }
 }

@@ -19,6 +19,17 @@ use crate::system::process::Life;
 
 /// How long a program may leave unread what it is told, before it is cut off.
 const UNREAD: Duration = Duration::from_secs(1);
+/// What a write to who is gone is to be: an error, and no signal that ends the program. Apple has this of a socket, not of a
+/// write.
+#[cfg(not(target_vendor = "apple"))]
+const QUIETLY: SendFlags = SendFlags::NOSIGNAL;
+#[cfg(target_vendor = "apple")]
+const QUIETLY: SendFlags = SendFlags::empty();
+/// What is asked of a connection to hear that its other side is gone: some systems tell only by its end of it.
+#[cfg(any(target_os = "linux", target_os = "android"))]
+const GONE: PollFlags = PollFlags::RDHUP;
+#[cfg(not(any(target_os = "linux", target_os = "android")))]
+const GONE: PollFlags = PollFlags::HUP;
 /// Bytes before a message: its length.
 const HEAD: usize = 4;
 
@@ -40,6 +51,8 @@ impl Channel {
     pub(crate) fn new(stream: UnixStream, most: usize, other: Arc<Life>) -> io::Result<Self> {
         stream.set_nonblocking(false)?;
         stream.set_write_timeout(Some(UNREAD))?;
+        #[cfg(target_vendor = "apple")]
+        rustix::net::sockopt::set_socket_nosigpipe(&stream, true)?;
         Ok(Self { stream: Arc::new(Kept::new(stream)), other, came: Vec::new(), unsent: Vec::new(), most })
     }
 
@@ -89,8 +102,7 @@ impl Channel {
     /// Sends what is left; `false` where the other side has no room for it.
     fn finish(&mut self, how: SendFlags) -> io::Result<bool> {
         while !self.unsent.is_empty() {
-            // Where the other side is gone that is an error, and no signal that ends the program.
-            match rustix::net::send(&**self.stream, &self.unsent, how | SendFlags::NOSIGNAL) {
+            match rustix::net::send(&**self.stream, &self.unsent, how | QUIETLY) {
                 Ok(count) => drop(self.unsent.drain(..count)),
                 Err(Errno::INTR) => {}
                 Err(Errno::AGAIN) => return Ok(false),
@@ -149,7 +161,7 @@ impl Channel {
 
     /// Whether the other side is still there.
     pub(crate) fn is_there(&self) -> bool {
-        let mut descriptors = [PollFd::new(&**self.stream, PollFlags::RDHUP)];
+        let mut descriptors = [PollFd::new(&**self.stream, GONE)];
         let now = Timespec { tv_sec: 0, tv_nsec: 0 };
         !matches!(poll(&mut descriptors, Some(&now)), Ok(1..)) && !self.other.is_gone()
     }

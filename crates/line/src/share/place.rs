@@ -72,6 +72,7 @@ pub(crate) enum Nobody {
     /// One did, and is gone or about to be.
     Gone,
     /// One does, and so many knock already that nobody hears this one.
+    #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only on Linux it is known before somebody opens"))]
     Crowded,
 }
 

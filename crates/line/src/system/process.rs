@@ -18,7 +18,7 @@ impl Process {
 }
 
 /// What this program is called: as the system shows it, at most 15 bytes.
-#[cfg(feature = "share")]
+#[cfg(all(unix, feature = "share"))]
 pub(crate) fn own_name() -> String {
     let shown = std::fs::read_to_string("/proc/self/comm").ok().map(|name| name.trim_end().to_owned());
     let named = || {
@@ -29,7 +29,7 @@ pub(crate) fn own_name() -> String {
 }
 
 /// Whether a process is held, by Ctrl-Z or a debugger. Only Linux tells.
-#[cfg(feature = "share")]
+#[cfg(all(unix, feature = "share"))]
 pub(crate) fn is_stopped(process: u32) -> bool {
     // `4711 (name) T …`; the name may hold anything.
     let status = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
@@ -72,6 +72,7 @@ pub(crate) enum Life {
     /// It can be waited for.
     #[cfg(target_os = "linux")]
     Watched(std::os::fd::OwnedFd),
+    #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux is asked"))]
     Gone,
     Unknown,
 }

@@ -12,12 +12,18 @@ use rustix::termios::{ControlModes, tcgetattr};
 
 use super::*;
 
+/// Not every system takes it of a pseudo-terminal that programs shall not inherit it.
+#[cfg(target_os = "linux")]
+const OWN: OpenptFlags = OpenptFlags::CLOEXEC;
+#[cfg(not(target_os = "linux"))]
+const OWN: OpenptFlags = OpenptFlags::empty();
+
 /// The other side of a pseudo-terminal, and the path to open.
 ///
 /// The path stays its own until the program ends, also when the other side is closed: the system would give it to the next
 /// who asks for a pseudo-terminal, which may be another test, and what was lost would seem to be there.
 pub(crate) fn pair() -> (File, String) {
-    let far: OwnedFd = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
+    let far: OwnedFd = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OWN).unwrap();
     grantpt(&far).unwrap();
     unlockpt(&far).unwrap();
     let path = ptsname(&far, Vec::new()).unwrap().into_string().unwrap();

@@ -2,16 +2,23 @@
 //!
 //! Nothing here judges how long something took, except that no character may be early.
 
+#[cfg(target_os = "linux")]
 use std::fs::{File, OpenOptions};
+#[cfg(unix)]
 use std::io::{ErrorKind, Read, Write};
+#[cfg(unix)]
 use std::net::TcpStream;
 use std::time::Duration;
 
 use drivebus_line::Line;
 #[cfg(target_os = "linux")]
 use drivebus_line::tty::{Tty, TtyOptions};
-use drivebus_rtu::{DataBits, Instant, Parity, SerialFormat, Silence, StopBits};
-use drivebus_sim::{FaultKind, Options, SimError, Simulator};
+use drivebus_rtu::Instant;
+#[cfg(unix)]
+use drivebus_rtu::{DataBits, Parity, SerialFormat, Silence, StopBits};
+#[cfg(target_os = "linux")]
+use drivebus_sim::FaultKind;
+use drivebus_sim::{Options, SimError, Simulator};
 
 use crate::bench::{framed, hex, pdu};
 
@@ -23,6 +30,7 @@ fn simulator() -> Simulator {
 }
 
 /// Asks who is there, three times, and reads each answer byte by byte, blocking.
+#[cfg(unix)]
 fn ask_thrice(simulator: &Simulator, port: &mut (impl Read + Write)) {
     for _ in 0..3 {
         let sent = simulator.now();
@@ -78,6 +86,7 @@ fn the_speed_that_a_program_sets_on_a_pseudo_terminal_counts_and_parity_does_not
     port.read_exact(&mut [0; 7]).unwrap();
 }
 
+#[cfg(unix)]
 #[test]
 fn a_tcp_port_keeps_the_settings_that_the_simulation_began_with() {
     let simulator = simulator();
@@ -157,6 +166,7 @@ fn all_ports_of_a_process_are_served_by_one_thread() {
     assert!(simulators.iter().all(|simulator| simulator.wire().requests() == 3));
 }
 
+#[cfg(unix)]
 #[test]
 fn tcp_is_refused_while_it_is_unplugged() {
     let simulator = simulator();
@@ -186,6 +196,7 @@ fn faults_and_echo_are_on_the_wire_behind_a_pseudo_terminal_too() {
     assert_eq!(simulator.wire().counts(FaultKind::Split), 1);
 }
 
+#[cfg(unix)]
 #[test]
 fn tcp_serves_one_client_after_the_other() {
     let simulator = simulator();
@@ -218,7 +229,9 @@ fn the_line_in_process_runs_in_real_time_too() {
 #[test]
 fn each_clock_allows_what_it_can() {
     let virtual_time = Simulator::new([(1, "gd350")], Options::default()).unwrap();
+    #[cfg(target_os = "linux")]
     assert!(matches!(virtual_time.serve_pty(), Err(SimError::VirtualTime)));
+    #[cfg(unix)]
     assert!(matches!(virtual_time.serve_tcp(), Err(SimError::VirtualTime)));
     assert!(matches!(simulator().advance(Duration::from_secs(1)), Err(SimError::RealTime)));
     assert_eq!(virtual_time.now(), Instant::ZERO);
