@@ -79,10 +79,10 @@ class Requests:
         Drives allow fewer words than the protocol (INVT: 16) and refuse more themselves.
 
         While a late answer to an earlier request could pass for the one to this read, a few words more may be asked
-        for, 16 at most, and cut off again. Where that does not help, two reads of fewer words are asked that have one in
-        common: two neighbours always come from one answer, three words and more may be of two moments. *verify* asks
-        for all of them at once. A call sends 8 requests at most for each time that it may ask (1 + *retries*
-        of the bus), whatever they are for.
+        for, 16 at most, and cut off again. Where that does not help, two reads of fewer words are asked that have one
+        in common: two neighbours always come from one answer, three words and more may be of two moments. *verify* asks
+        for all of them at once. A call sends 8 requests at most for each time that it may ask (1 + *retries* of the
+        bus), whatever they are for, and 3 more for each time that an answer has to come again.
 
         *timeout* (seconds) and *retries* are for this read alone; None is what the bus has.
 
