@@ -68,7 +68,7 @@ def settle(wheel: Path) -> None:
 
 def traces(wheel: Path) -> list[str]:
     """The files of `wheel` that hold a folder of who built it."""
-    folders = [str(folder).encode() for folder in (ROOT, cargo_home(), Path.home()) if folder != Path("/")]
+    folders = [str(folder).encode() for folder in (ROOT, cargo_home())]
     with zipfile.ZipFile(wheel) as archive:
         return [name for name in archive.namelist() if any(folder in archive.read(name) for folder in folders)]
 
