@@ -34,7 +34,7 @@ REPOSITORY = os.environ.get("DRIVEBUS_REPOSITORY_URL", "")
 
 Contents = list[tuple[str, list[str]]]
 CONTENTS: Contents = [
-    ("Begin", ["start", "recipes", "safety", "errors"]),
+    ("Begin", ["start", "installing", "recipes", "safety", "errors"]),
     ("Guides", ["commands", "python", "coming-from", "rust", "families", "not-in-the-list", "adapters"]),
     (
         "One thing at a time",
