@@ -1,4 +1,4 @@
-"""Makes a wheel say nothing of who built it, and when: the same sources give the same bytes.
+"""Makes a wheel say nothing of who built it, and when, so that the same sources can give the same bytes.
 
 maturin writes a list of the crates in a wheel (CycloneDX), with a random number, the time, and the folder of the
 sources. These are taken out. The times in the archive are already the same for all.
