@@ -58,13 +58,13 @@ help: ## what can be made
 demo: $(VENV)/.wheel
 	$(BIN)/drivebus demo
 
-# What is downloaded and built goes two at a time: a download, or the end of a link, leaves a core idle. No two of them need
+# What is downloaded and built goes three at a time: a download, or the end of a link, leaves a core idle. No two of them need
 # the same lock: one target folder of cargo each, and one pip. What is tested goes alone, so that nothing but the test makes
 # it wait.
-TWO := $(MAKE) --no-print-directory --jobs=2
+AT_ONCE := $(MAKE) --no-print-directory --jobs=3
 test:
-	@$(TWO) layers rust-lint $(VENV)/.dev dist/.wheel
-	@$(TWO) rust-build types interop-parts python-collect
+	@$(AT_ONCE) rust-lint dist/.wheel $(VENV)/.dev layers
+	@$(AT_ONCE) rust-build types interop-parts python-collect
 	@$(MAKE) --no-print-directory rust-test counts python-test examples wheel-smoke
 	@echo "make test: every check passed"
 
