@@ -3,6 +3,7 @@
 
 PYTHON ?= python3
 TEST_JOBS ?= 4
+PYTEST_JOBS ?= 5
 VENV   := .venv
 # What an environment calls the folder of its programs.
 BINS   := $(if $(filter Windows_NT,$(OS)),Scripts,bin)
@@ -153,10 +154,10 @@ PYTEST := env PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -p no:benchmark
 python-collect: $(VENV)/.dev $(VENV)/.wheel
 	@$(PYTEST) --quiet --collect-only >/dev/null
 
-# Most of these tests wait for a line and not for a core, so four files at a time take half as long as two. A file stays together:
+# Most of these tests wait for a line and not for a core, so five files at a time take half as long as two. A file stays together:
 # its tests share what it set up. Benchmarks are none of them, and their plug-in cannot stand company.
 python-test: $(VENV)/.dev $(VENV)/.wheel interop-parts
-	$(PYTEST) -n $(TEST_JOBS) --dist loadfile --no-loadscope-reorder
+	$(PYTEST) -n $(PYTEST_JOBS) --dist loadfile --no-loadscope-reorder
 
 examples: $(VENV)/.wheel
 	$(BIN)/python tools/run_examples.py
