@@ -133,11 +133,11 @@ impl<'r> Conversation<'r> {
 
     /// What has become of the request in flight by `now`.
     pub(super) fn poll<const U: usize, const P: usize>(&mut self, now: Instant, known: &mut Known<U, P>) -> Polled {
-        let asked = match self.ask().request {
+        let question = self.ask().request;
+        let asked = match question {
             Request::Read { count, .. } => count,
             _ => u16::MAX,
         };
-        let whole = self.ask().request.expected();
         let State::InFlight(flight) = &mut self.state else { return Polled::Over };
         if !flight.is_begun_last(known) {
             let slip = Slip { why: Unanswered::Misused, sent: flight.sent, ended: now };
@@ -180,7 +180,7 @@ impl<'r> Conversation<'r> {
             }
             Some(Event::Answer(answer)) => {
                 if let (Purpose::Last { .. }, Answer::Read { words, .. }) = (flight.purpose, &answer) {
-                    self.answer.goes_on_with(whole, *words);
+                    self.answer.goes_on_with(question.expected(), *words);
                 } else if flight.purpose.keeps_the_answer() {
                     self.answer.set(expected, &answer, asked);
                 }

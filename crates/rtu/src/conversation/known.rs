@@ -280,18 +280,17 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
         {
             return Next::AskApart(count);
         }
-        let in_two = if apart && may_be_mistaken && !self.others {
-            self.longer.parts(&self.master, now, unit, &ask.request)
-        } else {
-            None
-        };
         if waits
             && (in_quarantine || attribution.may_be_mistaken())
             && let Some(until) = self.watches(now, unit, ask, apart)
         {
             return Next::Watch(until);
         }
-        if let Some((first, last)) = in_two {
+        if apart
+            && may_be_mistaken
+            && !self.others
+            && let Some((first, last)) = self.longer.parts(&self.master, now, unit, &ask.request)
+        {
             return Next::AskInTwo(first, last);
         }
         if self.echo == OwnEcho::Unknown && (ask.request.expected().may_repeat_request() || in_quarantine) {

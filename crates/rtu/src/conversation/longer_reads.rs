@@ -71,13 +71,10 @@ impl<const N: usize> Longer<N> {
 
     /// Whether the answer of `unit` to `read` as it is can be no other's.
     pub(super) fn is_apart(&self, master: &Master, now: Instant, unit: UnitAddress, read: &Request<'_>) -> bool {
-        let is_given = match *read {
-            Request::Read { table, address, count, .. } => {
-                self.get(unit, (table, address)).is_none_or(|limit| count < limit.refused)
-            }
-            _ => false,
-        };
-        is_given && (master.tells_apart(now, unit, read) || has_another_length(master, now, unit, read))
+        let tells_apart =
+            |read: &Request<'_>| master.tells_apart(now, unit, read) || has_another_length(master, now, unit, read);
+        // The first of its lengths is its own, where that was not refused.
+        self.lengths(unit, read).next().is_some_and(|(_, read)| tells_apart(&read))
     }
 
     /// How many words the two parts of `request` have, the first one and the last, so that the answers of `unit` can be no others';
