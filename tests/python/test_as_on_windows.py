@@ -18,13 +18,17 @@ def words_of(code: str, *arguments: str) -> list[str]:
     return [sys.executable, str(_AS_ON_WINDOWS), code, *arguments]
 
 
+def executed(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(words_of(code, *arguments), capture_output=True, text=True, timeout=300)
+
+
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(words_of(_COMMAND, *arguments), capture_output=True, text=True, timeout=300)
+    return executed(_COMMAND, *arguments)
 
 
 def test_it_is_taken_away() -> None:
     code = "import os, socket, sys\nprint(sys.platform, hasattr(os, 'fork'), hasattr(socket, 'AF_UNIX'))\nimport pty"
-    ended = subprocess.run(words_of(code), capture_output=True, text=True, timeout=300)
+    ended = executed(code)
     assert ended.stdout == "win32 False False\n"
     assert "ModuleNotFoundError" in ended.stderr
 
@@ -38,7 +42,7 @@ def test_every_module_loads() -> None:
         "        importlib.import_module(each.name)\n"
         "print('loaded')"
     )
-    ended = subprocess.run(words_of(code), capture_output=True, text=True, timeout=300)
+    ended = executed(code)
     assert (ended.stdout, ended.stderr) == ("loaded\n", "")
 
 
@@ -93,5 +97,5 @@ def test_a_capture_is_replayed_over_tcp() -> None:
         "with Replay([heard], drivebus.SerialFormat()) as units, drivebus.Bus(units.port, share='never') as bus:\n"
         "    print(units.port[:12], bus.read(1, 0x2100, 1))\n"
     )
-    ended = subprocess.run(words_of(code), capture_output=True, text=True, timeout=300)
+    ended = executed(code)
     assert (ended.stdout, ended.stderr) == ("socket://127 [1337]\n", "")

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 import tomli
+from tools import cross_check
 from tools.absolute_links import ROOT, absolute, project
 
 import drivebus
@@ -68,6 +69,7 @@ def test_what_make_publishes_is_what_may_be_published() -> None:
     named = re.search(r"^PUBLISHED := (.*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
     assert named is not None
     assert set(named[1].split()) == published
+    assert set(cross_check.PUBLISHED) == published
 
 
 def test_the_newest_entry_of_the_changelog_is_this_version() -> None:
