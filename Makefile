@@ -22,8 +22,9 @@ export PROPTEST_RNG_SEED ?= 1
 
 RUST_SOURCES   := Cargo.toml Cargo.lock $(shell find crates -type f \( -name '*.rs' -o -name '*.toml' -o -name '*.csv' -o -name '*.json' -o -name '*.md' \))
 PYTHON_SOURCES := pyproject.toml README.md $(shell find python -type f \( -name '*.py' -o -name '*.pyi' -o -name py.typed \))
-# The extension module has no Rust tests, and linking a test of it would need a shared libpython.
-RUST_TESTED := --workspace --exclude drivebus-python
+# The extension module has no Rust tests, but is named everywhere: a crate's features are those of all that is named, and with
+# other features it is built once more. Benchmarks have no tests, and need what nothing else does.
+RUST_TESTED := --workspace --exclude drivebus-benches
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -112,7 +113,7 @@ layers: $(VENV)/.created
 rust-lint: $(VENV)/.created
 	$(CARGO) fmt --check
 	$(CARGO) clippy $(LOCKED) --quiet --workspace --all-targets -- -D warnings
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc $(LOCKED) --quiet --no-deps $(RUST_TESTED)
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc $(LOCKED) --quiet --no-deps --workspace
 
 types: $(VENV)/.dev $(VENV)/.wheel
 	$(BIN)/ruff check
