@@ -1,4 +1,4 @@
-"""What stores, forces or reverses is given by its name. By its place it works until 0.1, and says how it is written."""
+"""What stores, forces or reverses is given by its name. By its place it works until 1.0, and says how it is written."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_by_its_place_it_is_taken_and_the_name_is_said(name: str, virtual: Simul
     if name in ("run", "jog"):
         drive.prepare_control()
     virtual.drive(1).take_writes()
-    with pytest.warns(DeprecationWarning, match=f"{said}.*by its name, from drivebus 0.1 on only so") as warned:
+    with pytest.warns(DeprecationWarning, match=f"{said}.*by its name, from drivebus 1.0 on only so") as warned:
         call(drive)
     assert warned[0].filename == __file__
     assert written in [(address, value) for _, address, value in virtual.drive(1).writes()]

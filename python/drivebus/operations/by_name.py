@@ -1,6 +1,6 @@
 """What stores, forces or reverses is given by its name: where it stands in a call nobody can read what it does.
 
-By its place it works until 0.1, and says how it is written now.
+By its place it works until 1.0, and says how it is written now.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def by_name(name: str, *, after: int) -> Callable[[Callable[_P, _R]], Callable[_
         if len(args) != after + 2 or name in kwargs:
             return args, kwargs
         value = args[-1]
-        text = f"{method}(…, {name}={checks.shown(value)}): {name} is given by its name, from drivebus 0.1 on only so"
+        text = f"{method}(…, {name}={checks.shown(value)}): {name} is given by its name, from drivebus 1.0 on only so"
         warnings.warn(text, DeprecationWarning, stacklevel=level_of_the_program())
         return args[:-1], {**kwargs, name: value}
 

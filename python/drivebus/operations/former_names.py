@@ -1,4 +1,4 @@
-"""Setpoints by the names that they had: each still works, says the name that it has now, and goes with 0.1."""
+"""Setpoints by the names that they had: each still works, says the name that it has now, and goes with 1.0."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _Reads = Coroutine[Any, Any, float]
 
 def _is_now(former: str, now: str) -> None:
     """Says once for each place of the program that *former* is *now*."""
-    text = f"drive.{former} is drive.{now} now, and goes with drivebus 0.1"
+    text = f"drive.{former} is drive.{now} now, and goes with drivebus 1.0"
     warnings.warn(text, DeprecationWarning, stacklevel=level_of_the_program())
 
 
