@@ -1,4 +1,6 @@
-//! Scaling is exact: every word of every entry, and every value that is no word.
+//! Scaling is exact: every word of every scale, and every value that is no word.
+
+use std::collections::BTreeSet;
 
 use drivebus_drives::{Entry, Input, Profile, Value, ValueError};
 use proptest::prelude::*;
@@ -14,11 +16,24 @@ fn is_allowed(entry: &Entry, count: i64) -> bool {
     quantity.low().is_none_or(|low| low.count() <= count) && quantity.high().is_none_or(|high| count <= high.count())
 }
 
+/// Every word for the first entry of a scale and a sign. For others of them those at and around the bounds, and every 251st:
+/// what differs is where the bounds are.
+fn words(entry: &Entry, is_first: bool) -> impl Iterator<Item = u16> {
+    let quantity = entry.quantity();
+    let word = |bound: Value| u16::try_from(bound.count().rem_euclid(0x1_0000)).unwrap();
+    let bounds = [quantity.low(), quantity.high()].map(|bound| bound.map_or(0, word));
+    let edges = [0, 0x7FFF, 0x8000, u16::MAX].into_iter().chain(bounds);
+    let step = if is_first { 1 } else { 251 };
+    (0..=u16::MAX).step_by(step).chain(edges.flat_map(|edge| [edge.wrapping_sub(1), edge, edge.wrapping_add(1)]))
+}
+
 #[test]
-fn every_word_of_every_entry_goes_around() {
+fn every_word_of_every_scale_goes_around() {
     let profile = Profile::builtin("gd350").unwrap();
+    let mut seen = BTreeSet::new();
     for entry in profile.entries() {
-        for raw in 0..=u16::MAX {
+        let is_first = seen.insert((entry.quantity().ratio(), entry.quantity().is_signed()));
+        for raw in words(entry, is_first) {
             let value = entry.decode(raw);
             assert_eq!(value.count(), counts(entry, raw));
             // By a float, and by the printed digits.
