@@ -46,7 +46,7 @@ def ask_by_libmodbus(port: str, count: int, library: str) -> None:
     lib.modbus_write_register.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_uint16]
     context = lib.modbus_new_rtu(port.encode(), 19200, b"N", 8, 1)
     lib.modbus_set_slave(context, 1)
-    lib.modbus_set_response_timeout(context, 0, 200_000)
+    lib.modbus_set_response_timeout(context, 2, 0)
     assert lib.modbus_connect(context) == 0
     words = (ctypes.c_uint16 * 125)()
     try:
