@@ -11,6 +11,7 @@ import functools
 import importlib.util
 import itertools
 import os
+import sys
 import tempfile
 from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
@@ -29,6 +30,14 @@ settings.register_profile("drivebus", deadline=None)
 settings.load_profile("drivebus")
 
 dispositions_as_usual()
+
+# Their slaves, screens and signals are those of POSIX.
+OF_POSIX = """
+cli_monitor cli_reserved_units cli_several closing_servers end_of_program errors huanyang_asked read_only_forms record
+reserved_units search_huanyang settings_changed seven_bits shared_bounds shared_port sniff_end system_calls tables
+what_came wrong_inside
+"""
+collect_ignore = [f"test_{name}.py" for name in OF_POSIX.split()] if sys.platform == "win32" else []
 
 NO_PTY = pytest.mark.skipif(os.name == "nt", reason="no pty")
 TRANSPORTS = ["process", pytest.param("pty", marks=NO_PTY), "tcp"]
