@@ -225,6 +225,7 @@ $(DOCS_VENV)/.installed: pyproject.toml dist/.wheel
 
 # Once its tools are there, nothing of it needs a network: not the build, and not who reads the site.
 docs: $(DOCS_VENV)/.installed ## writes target/site
+	$(DOCS_VENV)/bin/python tools/count_words.py
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc $(LOCKED) --quiet --no-deps $(PUBLISHED:%=--package %)
 	$(DOCS_VENV)/bin/python -m tools.build_site --rust $(RUSTDOC)
 

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from tools import build_site
+from tools import build_site, count_words
 from tools.absolute_links import project
 from tools.build_site import BELOW, CONTENTS, DOCS, REFERENCE, ROOT, foreign_files, placed, rewritten
 from tools.family_pages import ABOUT
@@ -52,6 +52,12 @@ def test_a_link_out_of_the_site_leads_to_the_repository() -> None:
     assert rewritten(f"[`x`]({up}/crates/rtu)", page) == f"[`x`]({address}/tree/v{version}/crates/rtu)"
     crate = '<a href="rust/drivebus/index.html">x</a>'
     assert rewritten(f"[`x`]({up}/crates/drivebus/README.md)", page, rust=True) == crate
+
+
+def test_the_pages_for_users_stay_short() -> None:
+    assert sum(count_words.by_page().values()) <= count_words.LIMIT
+    page = "# A title\n\nFour [words](x.md) | here, `now`.\n\n   ```text\n   none of it\n   ```\n\nTwo more.\n"
+    assert count_words.words(page) == 8
 
 
 def test_a_file_from_elsewhere_is_found(tmp_path: Path) -> None:
