@@ -32,6 +32,9 @@ html_title = f"drivebus {version}"
 html_copy_source = False
 html_show_sphinx = False
 html_show_copyright = False
+# No page leads to an index of all names: the search finds them.
+html_use_index = False
+html_domain_indices = False
 # Written by tools/build_site.py: pages for users come before the reference, and that before pages for developers.
 html_search_scorer = str(Path(__file__).with_name("scorer.js"))
 
