@@ -28,7 +28,7 @@ RUST_TESTED := --workspace --exclude drivebus-benches
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo docs test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
+.PHONY: help demo docs try-docs test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
         machine screens format schema types layers rust-lint rust-build rust-test counts counts-update python-collect python-test interop-parts examples wheel-smoke \
         pictures matrix semver sdist release-check release-readme archives publish-crates wheels cross-check
 
@@ -37,6 +37,7 @@ help: ## what can be made
 	@echo "make test    sets everything up and runs every check"
 	@echo "make lint    format, clippy, rustdoc, ruff, mypy, pyright, stubtest, layers"
 	@echo "make docs    the documentation as a site with a search, in target/site"
+	@echo "make try-docs   that site in a real browser: wide and narrow, and searched"
 	@echo "make bench   the benchmarks; writes benches/RESULTS.md"
 	@echo "make conformance   other masters on the same hostile line; writes docs/developers/conformance.md"
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
@@ -226,8 +227,12 @@ $(DOCS_VENV)/.installed: pyproject.toml dist/.wheel
 
 # Once its tools are there, nothing of it needs a network: not the build, and not who reads the site.
 docs: $(DOCS_VENV)/.installed ## writes target/site
+	$(DOCS_VENV)/bin/python tools/count_words.py
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc $(LOCKED) --quiet --no-deps $(PUBLISHED:%=--package %)
 	$(DOCS_VENV)/bin/python -m tools.build_site --rust $(RUSTDOC)
+
+try-docs: ## after make docs; needs Debian's chromium-headless-shell, or another Chromium
+	$(PYTHON) tools/try_site.py
 
 # libFuzzer needs no nightly compiler: without a sanitizer its counters are plain code generation options. The memory
 # limit is the oracle of "bounded". What is found is kept out of the work tree until `make fuzz-corpus` chooses from it.

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 from pygments.lexers.special import TextLexer
+from sphinx.search.en import SearchEnglish
 
 import drivebus
 
@@ -29,6 +32,30 @@ html_title = f"drivebus {version}"
 html_copy_source = False
 html_show_sphinx = False
 html_show_copyright = False
+# No page leads to an index of all names: the search finds them.
+html_use_index = False
+html_domain_indices = False
+# Written by tools/build_site.py: pages for users come before the reference, and that before pages for developers.
+html_search_scorer = str(Path(__file__).with_name("scorer.js"))
+
+
+class CodesAsWords(SearchEnglish):
+    """English, with codes such as `E.oC`, `P00.11` and `b1-01` as words of their own, besides their parts."""
+
+    code = re.compile(r"\w+(?:[.-]\w+)+")
+    # A code that no page has is searched for by its parts.
+    js_splitter_code = r"""
+var splitQuery = (query) =>
+  (query.match(/[\p{Letter}\p{Number}_]+(?:[.-][\p{Letter}\p{Number}_]+)*/gu) || []).flatMap((word) => {
+    const stemmed = new Stemmer().stemWord(word.toLowerCase());
+    const isKnown = [Search._index.terms, Search._index.titleterms].some((terms) => Object.hasOwn(terms, stemmed));
+    return isKnown ? [word] : word.split(/[.-]/);
+  });
+"""
+
+    def split(self, text: str) -> list[str]:
+        """The words of a text."""
+        return super().split(text) + self.code.findall(text)
 
 
 def keep_colons(*told: Any) -> None:
@@ -41,5 +68,6 @@ def keep_colons(*told: Any) -> None:
 def setup(app: Any) -> None:
     """Called by Sphinx."""
     app.add_lexer("csv", TextLexer)
+    app.add_search_language(CodesAsWords)
     # Before Napoleon, which has the usual place.
     app.connect("autodoc-process-docstring", keep_colons, priority=400)

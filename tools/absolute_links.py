@@ -13,7 +13,10 @@ import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import tomli
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -32,7 +35,7 @@ class Project(NamedTuple):
 
 def project(root: Path = ROOT) -> Project:
     """The version and the address of the project in *root*."""
-    package: dict[str, Any] = tomli.loads((root / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]
+    package: dict[str, Any] = tomllib.loads((root / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["package"]
     return Project(package["version"], package["repository"])
 
 

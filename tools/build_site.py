@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import html
+import json
 import os
 import re
 import shutil
@@ -18,19 +19,17 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from tools.absolute_links import ROOT, lasting
 from tools.family_pages import ABOUT, family_page
 
 import drivebus
 
-ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 TARGET = ROOT / "target"
 RUST = re.compile(r"^```rust[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!\w+:|#)([^)#\s]+)((?:#[^)\s]*)?)\)")
 FETCHED = re.compile(r"<(?:script|link|img|iframe|source)\b[^>]*\b(?:src|href)=\"(?:https?:)?//[^>]*>")
 IMPORTED = re.compile(r"(?:@import|url\()\s*[\"']?(?:https?:)?//[^;)]*")
-# Where the repository can be read, once it is published: links to its sources lead there.
-REPOSITORY = os.environ.get("DRIVEBUS_REPOSITORY_URL", "")
 
 Contents = list[tuple[str, list[str]]]
 CONTENTS: Contents = [
@@ -131,9 +130,7 @@ def rewritten(text: str, path: Path, *, rust: bool = False) -> str:
             # Nothing that Sphinx knows of: it stands beside what Sphinx makes.
             page = os.path.relpath(f"rust/{CRATES[crate]}/index.html", Path(here).parent)
             return f'<a href="{page}">{html.escape(shown.replace("`", ""))}</a>'
-        if REPOSITORY:
-            return f"[{shown}]({REPOSITORY}/blob/main/{source})"
-        return shown if source in shown else f"{shown} (`{source}`)"
+        return f"{bang}[{shown}]({lasting(target + anchor, path, ROOT, picture=bool(bang))})"
 
     return RUST.sub(as_shown, LINK.sub(lead, text))
 
@@ -212,6 +209,33 @@ def write_contents(source: Path) -> None:
             page.write(toctree(pages))
 
 
+WEIGHTS = {"": 10.0, "families": 5.0, "reference": 0.0, "developers": -5.0}
+"""What a hit of the search is worth by the folder of its page. A word in a heading is worth 15, one in the text 5."""
+
+SCORER = """
+var Scorer = {
+  score: ([page, , , , score]) => score + (WEIGHTS[page] ?? 0),
+  objNameMatch: 11, objPartialMatch: 6, objPrio: {0: 15, 1: 5, 2: -5}, objPrioDefault: 0,
+  title: 15, partialTitle: 7, term: 5, partialTerm: 2,
+};
+"""
+"""The values of Sphinx's own scorer, and the weight of the page."""
+
+
+def weights(source: Path) -> dict[str, float]:
+    """What each page adds to a hit. Of pages of one kind, those that the contents name first come first."""
+    pages = [page for _, listed in CONTENTS for page in listed]
+    pages += [f"families/{name}" for name in drivebus.profiles()]
+    found = [path.relative_to(source).with_suffix("").as_posix() for path in sorted(source.rglob("*"))]
+    pages += [page for page in found if page not in pages]
+    return {page: WEIGHTS.get(page.rpartition("/")[0], 0.0) - at / 1000 for at, page in enumerate(pages)}
+
+
+def write_scorer(source: Path) -> None:
+    """What the search sorts its hits by."""
+    (source / "scorer.js").write_text(f"const WEIGHTS = {json.dumps(weights(source))};{SCORER}", encoding="utf-8")
+
+
 def foreign_files(site: Path) -> list[str]:
     """What pages of the *site* would fetch from elsewhere: there must be nothing."""
     found = []
@@ -236,6 +260,7 @@ def main() -> int:
     write_pages(source, rust=options.rust is not None)
     write_reference(source)
     write_contents(source)
+    write_scorer(source)
     shutil.rmtree(options.out, ignore_errors=True)
     doctrees = TARGET / "site-doctrees"
     shutil.rmtree(doctrees, ignore_errors=True)

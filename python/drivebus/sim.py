@@ -228,7 +228,7 @@ class Simulator:
         clock: `"real"`, or `"virtual"` (only with `"process"`): time jumps to what happens next, nobody waits.
         strict_silence: Whether drives ignore requests that come before the silence is over, as real ones do.
         faults: The share (0.0..1.0) of answers that each kind of fault hits, such as `{"flip_bit": 0.02}`;
-            `"all"` is every kind but `"unplug"`. docs/simulator.md says what each does.
+            `"all"` is every kind but `"unplug"`. docs/reference/simulator.md says what each does.
         echo: Whether the adapter hands back what it sends.
         link: A symbolic link that is kept leading to the pseudo-terminal, whatever name `line.replug()` gave it. With
             it `"auto"` means `"pty"`.

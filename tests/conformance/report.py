@@ -199,7 +199,7 @@ FAULTS = """\
 
 A simulated GD350 at 115200 bit/s, 8N1; 2 % of answers are hit by the fault named, in the row `all` by each of them
 but `unplug`. Seed {seed}. {reads} reads of two registers in each row, {all} in the last; defaults of each library,
-retries included. The simulator's page (docs/simulator.md) says what each fault does; a `late` answer comes 250 to
+retries included. docs/reference/simulator.md says what each fault does; a `late` answer comes 250 to
 500 ms after it was due, an `overtaken` one 220 to 800 ms, the port is unplugged before every 50th read, for 250 ms.
 
 Cells are right / wrong / error / hung. While the port is away errors come as fast as a library raises them.

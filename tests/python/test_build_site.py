@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
-from tools import build_site
+from tools import build_site, count_words
+from tools.absolute_links import project
 from tools.build_site import BELOW, CONTENTS, DOCS, REFERENCE, ROOT, foreign_files, placed, rewritten
 from tools.family_pages import ABOUT
 
@@ -44,13 +45,19 @@ def test_links_lead_to_pages_of_the_site(page: Path) -> None:
         assert there in PLACES or (DOCS / there).is_file(), target
 
 
-def test_a_link_out_of_the_site_names_its_file(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_link_out_of_the_site_leads_to_the_repository() -> None:
     page, up = DOCS / "index.md", ".."
-    assert rewritten(f"[figures]({up}/benches/RESULTS.md)", page) == "figures (`benches/RESULTS.md`)"
+    version, address = project()
+    assert rewritten(f"[x]({up}/README.md#use)", page) == f"[x]({address}/blob/v{version}/README.md#use)"
+    assert rewritten(f"[`x`]({up}/crates/rtu)", page) == f"[`x`]({address}/tree/v{version}/crates/rtu)"
     crate = '<a href="rust/drivebus/index.html">x</a>'
     assert rewritten(f"[`x`]({up}/crates/drivebus/README.md)", page, rust=True) == crate
-    monkeypatch.setattr(build_site, "REPOSITORY", "https://example.org/drivebus")
-    assert rewritten(f"[x]({up}/README.md)", page) == "[x](https://example.org/drivebus/blob/main/README.md)"
+
+
+def test_the_pages_for_users_stay_short() -> None:
+    assert sum(count_words.by_page().values()) <= count_words.LIMIT
+    page = "# A title\n\nFour [words](x.md) | here, `now`.\n\n   ```text\n   none of it\n   ```\n\nTwo more.\n"
+    assert count_words.words(page) == 8
 
 
 def test_a_file_from_elsewhere_is_found(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ LINUX = pytest.mark.skipif(os.name != "posix" or not Path("/dev/pts").is_dir(), 
 
 
 def test_the_kinds_are_those_of_the_documentation() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "simulator.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "simulator.md").read_text(encoding="utf-8")
     table = page.partition("### Faults by chance")[2]
     named = [line.split("`")[1] for line in table.splitlines() if line.startswith("| `")]
     assert named == list(FAULT_KINDS)
