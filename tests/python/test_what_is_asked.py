@@ -285,7 +285,7 @@ class TestWhatIsSaid:
     def test_a_port_that_is_lost_before_the_state_shows_it(self, bus: StandIn, drive: Drive) -> None:
         drive.state()
         bus.failures = [None, drivebus.PortError("gone")]
-        with pytest.raises(drivebus.Unconfirmed, match=r"gone.*may still be fed.*0\.0 s ago: stopped"):
+        with pytest.raises(drivebus.Unconfirmed, match=r"gone.*may still be powered.*0\.0 s ago: stopped"):
             drive.coast()
 
 
