@@ -30,6 +30,11 @@ impl Profile {
         if let Some(entry) = self.find_loosely(text) {
             return std::iter::once(entry).take(limit).collect();
         }
+        self.search_corrected(text, limit)
+    }
+
+    /// The entries in which all words of `text` occur, each that occurs nowhere taken for the nearest that does.
+    pub(crate) fn search_corrected(&self, text: &str, limit: usize) -> Vec<&Entry> {
         let corrected: Vec<String> = words(text).take(MOST_WORDS).map(|word| self.corrected(word)).collect();
         self.search_words(&corrected, limit)
     }
