@@ -294,12 +294,14 @@ class Panel(App[None]):
 
     def action_quit_asking(self) -> None:
         """Ends the panel; asks first where that stops a motor."""
-        started = [member.called for member in self.members if member.motor.started]
-        if not started:
-            self.exit()
-            return
-        text = f"The panel started {', '.join(started)}. Its end stops what it started. Leave it?"
-        self.push_screen(Ask(text, {"y": "stop and leave"}), lambda key: self.action_leave() if key else None)
+        started = [member for member in self.members if member.motor.started]
+        # One that stands is stopped as well when the panel ends; that needs no question.
+        turning = [member.called for member in started if not render.rests(member)]
+        if turning:
+            question = Ask(f"Stop {' and '.join(turning)}, and quit?", {"y": "stop and quit"})
+            self.push_screen(question, lambda key: self.action_leave() if key else None)
+        else:
+            self.action_leave()
 
     # --- what is asked -----------------------------------------------------------------------------------------
 

@@ -59,6 +59,8 @@ class Member:
         self.session = session
         self.line = line
         self.motor = PanelMotor(session.called, self._halt, self._tell, journal, watchdog)
+        self._journal = journal
+        self._fault: int | None = None
         self.drive: drivebus.Drive | None = None
         self.watched: Watched | None = None
         self.highest: float | None = None
@@ -167,6 +169,7 @@ class Member:
         self._taken = sample
         self.watched.take(sample)
         if sample.missing is None:
+            self._see_whether_it_trips(sample)
             self._see_whether_it_slows(sample)
             self.told = {}
             for word in self._words:
@@ -182,6 +185,17 @@ class Member:
         if watched is None or watched.now is None or watched.state is None or watched.state not in watched.now:
             return None
         return drivebus.State(watched.profile.state(int(watched.now[watched.state])))
+
+    def _see_whether_it_trips(self, sample: drivebus.Sample) -> None:
+        """Says in the journal that it tripped, or was in fault when it was seen first."""
+        assert self.watched is not None
+        if self.watched.fault is None or self.watched.fault not in sample:
+            return
+        profile, before = self.watched.profile, self._fault
+        self._fault = profile.fault_number(int(sample[self.watched.fault]))
+        if self._fault and self._fault != before:
+            happened = "is in fault" if before is None else "tripped"
+            self._journal.say(f"{self.called} {happened}: {profile.fault(self._fault)}", "bold red")
 
     def _see_whether_it_slows(self, sample: drivebus.Sample) -> None:
         """One that stands is not on its way to a stop any more, nor is one that somebody else has started again."""

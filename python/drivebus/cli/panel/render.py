@@ -27,6 +27,7 @@ __all__ = [
     "marks",
     "named",
     "plain_value",
+    "rests",
     "scaled",
     "state",
     "tiles",
@@ -93,19 +94,24 @@ def _state(member: Member) -> Text:
     if member.motor.is_slowing and state is not None and (doing := going(state, drivebus.State.STOPPED)):
         return Text(doing, "yellow")
     told = member.watched.doing()
-    return told if told.plain else Text("state not told", "dim")
+    return told if told.plain else Text("state not told; --unverified may show it", "dim")
 
 
 def _nothing(member: Member) -> str:
     """Why there is nothing to show, in two words."""
     if member.is_silent:
-        return "no answer"
+        return "no port" if isinstance(member.problem, drivebus.PortError) else "no answer"
     return "not known" if member.why else "waiting"
 
 
 def turns(member: Member) -> bool:
     """Whether its motor turns, as far as it tells."""
     return member.state is not None and member.state.running
+
+
+def rests(member: Member) -> bool:
+    """Whether its motor surely stands, by a value that is fresh."""
+    return member.state is not None and not member.why and member.state.at_rest
 
 
 def tripped(member: Member) -> bool:
