@@ -106,6 +106,16 @@ class Member:
         return f'profile = "{family}"' if self.session.name else f"--profile {self.session.unit}={family}"
 
     @property
+    def likely(self) -> str:
+        """The one family that it may be of, where it does not say itself what it is; empty where there are several."""
+        return self.may_be[0] if self.naming and len(self.may_be) == 1 else ""
+
+    def take_as(self, family: str) -> None:
+        """Takes it as of *family* from the next look on."""
+        self.session = replace(self.session, profile=family)
+        self._journal.say(f"{self.called}: taken as a {family} until this panel ends; {self.naming} names it")
+
+    @property
     def is_silent(self) -> bool:
         """Whether it does not answer now. One that answers, and does not say what it is, is not silent."""
         return bool(self.why) and not isinstance(self.problem, drivebus.NotAllowed)
