@@ -161,6 +161,10 @@ class Session:
         """The bus that the options name, opened."""
         port = self.one_port()
         bits, parity, stop = self.line_format
+        if bits != "8":
+            raise WrongUse(
+                f"Modbus RTU has 8 data bits, and --format has {bits}: `{self.doctor()}` finds the right one"
+            )
         settings: dict[str, Any] = {
             "baudrate": self.baud,
             "bytesize": int(bits),

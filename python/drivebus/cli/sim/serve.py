@@ -7,11 +7,12 @@ import shlex
 import signal
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 import drivebus
 from drivebus.cli.names import complete_units
@@ -110,15 +111,17 @@ def sim(
     """Serve simulated drives until Ctrl-C or SIGTERM, for this program or any other: `drivebus sim gd350`.
 
     The line has the settings of the global options --baud and --format: `drivebus sim --units 1=vfd500 --baud 9600
-    --format 8N1`.
+    --format 8N1`. Without them, a profile of your own says how its drive leaves the factory.
 
     While it serves them, `drivebus sim ctl` in another window trips, loads and unplugs them.
     """
     if context.invoked_subcommand is not None:
         return
+    drives = _simulated(units)
+    session = _on_their_line(context, session, drives)
     bits, parity, stop = session.line_format
     simulator = drivebus.Simulator(
-        _simulated(units),
+        drives,
         baudrate=session.baud,
         bytesize=int(bits),
         parity=parity,
@@ -230,6 +233,20 @@ class _Served:
         if self.takes_orders:
             out.say("Trip, load, unplug: `drivebus sim ctl --help`")
         out.say("Ctrl-C ends it.")
+
+
+def _on_their_line(context: click.Context, session: Session, drives: dict[int, str]) -> Session:
+    """*session* with the line that profiles of one's own give, where they agree and none was typed."""
+    root = context.find_root()
+    typed = any(root.get_parameter_source(name) is not ParameterSource.DEFAULT for name in ("baud", "line_format"))
+    if typed or any(family in drivebus.profiles() for family in drives.values()):
+        return session
+    known = [drivebus.Profile.find(family).serial() for family in drives.values()]
+    lines = {(each.baud_rate, each.format) for each in known if each is not None}
+    if len(lines) != 1 or None in known:
+        return session
+    [(baud, characters)] = lines
+    return replace(session, baud=baud, line_format=(characters[0], characters[1], characters[2]))
 
 
 def _simulated(text: str) -> dict[int, str]:
