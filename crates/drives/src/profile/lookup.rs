@@ -50,7 +50,7 @@ const OFFERED: usize = 5;
 
 fn hint(name: &str, closest: &[String]) -> String {
     if let Some(register) = numbered_from_40001(name) {
-        return format!("; {} is register {register:04X}H: write 0x{register:04X}", name.trim());
+        return format!("; {} is register {register:04X}H: name it 0x{register:04X}", name.trim());
     }
     match closest {
         [] => String::new(),
@@ -138,7 +138,7 @@ impl Profile {
         }
         let mut found = self.search_exactly(name, OFFERED);
         if found.is_empty() {
-            found = self.search_corrected(name, OFFERED);
+            found = self.search_nearly(name, OFFERED);
         }
         found.into_iter().map(|entry| entry.alias().unwrap_or(entry.name()).to_owned()).collect()
     }

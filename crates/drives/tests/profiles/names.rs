@@ -44,8 +44,8 @@ fn what_is_not_found_is_explained() {
     }
     assert_eq!(profile.find("zzz").unwrap_err().to_string(), "gd350 has no \"zzz\"");
     for (number, said) in [
-        ("40001", "; 40001 is register 0000H: write 0x0000"),
-        ("412289", "; 412289 is register 3000H: write 0x3000"),
+        ("40001", "; 40001 is register 0000H: name it 0x0000"),
+        ("412289", "; 412289 is register 3000H: name it 0x3000"),
         ("30001", ""),
     ] {
         assert_eq!(profile.find(number).unwrap_err().to_string(), format!("gd350 has no \"{number}\"{said}"));

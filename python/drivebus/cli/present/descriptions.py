@@ -114,7 +114,7 @@ class Matches:
         if all(word in best for word in self.wanted.lower().split()):
             count = f"{len(self.found)} {matches}"
         else:
-            count = f"nothing that is called so, and {len(self.found)} near {matches}"
+            count = f"nothing called that, but {len(self.found)} near {matches}"
         narrower = f", the best {_MATCHES} of them; more words narrow it" if len(self.found) > _MATCHES else ""
         out.say(f'{self.profile.name} has {count} for "{self.wanted}"{narrower}:')
         rows = self._rows()
