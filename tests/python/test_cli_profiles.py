@@ -171,7 +171,7 @@ class TestDescribe:
         for text, name in (("out_curent", "output_current"), ("amps", "output_current"), ("P14-04", "P14.04")):
             assert name in [row["code"] or row["name"] for row in rows("--profile", EX9, "describe", text)][:3]
         found = run("--profile", "gd350", "describe", "dc", "link").stdout
-        assert found.startswith('gd350 has nothing that is called so, and 2 near matches for "dc link":')
+        assert found.startswith('gd350 has nothing called that, but 2 near matches for "dc link":')
 
     def test_nothing_that_comes_near(self) -> None:
         result = run("--profile", EX9, "describe", "frobnicate")

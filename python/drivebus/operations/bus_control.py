@@ -109,7 +109,7 @@ async def check_heeded(unit: DriveView, setpoint: str, register: str) -> None:
                 Advice("prepare_control", setpoint, f'prepare_control(setpoint="{setpoint}")'),
                 " sets it so; ",
                 Advice("write", register, f'write("{register}", …)'),
-                " writes it all the same",
+                " writes it anyway",
             ),
             why="settings",
             unit=unit.address,

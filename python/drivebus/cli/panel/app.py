@@ -387,7 +387,7 @@ class Panel(App[None]):
 
     def _unknown(self, member: Member) -> None:
         why = f": {member.why}" if member.why else " yet"
-        self.journal.say(f"{member.called}: what drive it is, is not known{why}. Space stops it all the same", "yellow")
+        self.journal.say(f"{member.called}: what drive it is, is not known{why}. Space stops it anyway", "yellow")
 
     # --- what ends it ------------------------------------------------------------------------------------------
 

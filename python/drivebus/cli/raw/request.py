@@ -96,5 +96,5 @@ def check_commands(request: Request) -> None:
             raise drivebus.BadArgument(
                 f"{word} at {tables.shown(address)} is not a command of any family that has its command register there "
                 f"({', '.join(family.name for family in there)}); nothing was sent to unit {request.unit}. With "
-                "--profile the family is known; with --force it is sent all the same"
+                "--profile the family is known; --force sends it anyway"
             )
