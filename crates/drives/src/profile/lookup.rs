@@ -137,7 +137,8 @@ impl Profile {
             return vec![near.to_owned()];
         }
         let mut found = self.search_exactly(name, OFFERED);
-        if found.is_empty() {
+        // A code that is not there stands for no other.
+        if found.is_empty() && !name.bytes().any(|letter| letter.is_ascii_digit()) {
             found = self.search_nearly(name, OFFERED);
         }
         found.into_iter().map(|entry| entry.alias().unwrap_or(entry.name()).to_owned()).collect()
