@@ -236,7 +236,7 @@ class TestADriveThatMagnetisesTheMotor:
             return read(unit, address, count, **how)
 
         monkeypatch.setattr(bus, "read", shown)
-        with pytest.raises(drivebus.Unconfirmed, match=rf"{command} was sent.*pre exciting"):
+        with pytest.raises(drivebus.Unconfirmed, match=rf"{command.replace('_', ' ')} was sent.*pre exciting"):
             getattr(drive, command)()
         assert len(bus.calls("write")) == 1
         state[STATE] = STOPPED
