@@ -112,7 +112,7 @@ def test_a_drive_that_is_stuck_after_06h_gets_no_07h(
     assert told.startswith(
         "unit 1 was not started: shutdown (0006H) was sent, once, and its state word shows 0240H (stopped"
     )
-    for said in ("ready_to_switch_on off and not on", "switch_on_disabled on and not off", "run_forward was not sent"):
+    for said in ("ready_to_switch_on off and not on", "switch_on_disabled on and not off", "run forward was not sent"):
         assert said in told
 
 

@@ -121,7 +121,7 @@ SPOILT = [
     ("P00.03 = { value = 50.00, raw = 5000.0 }", "raw 5000.0 is not a whole number"),
     ("P00.03 = { value = 50.00, raw = true }", "raw True is not a whole number"),
     ("P00.03 = { value = true }", "value True is not a number"),
-    ("P00.03 = { value = nan }", "not a number of Hz"),
+    ("P00.03 = { value = nan }", "not a number; give it in Hz"),
     ("P00.03 = { value = inf }", "inf"),
     ("P00.03 = { raw = 5000 }", "P00.03 lacks its value"),
     ("P00.03 = { value = 50.00, words = 5000 }", 'has no field "words"'),

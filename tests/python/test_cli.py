@@ -53,11 +53,14 @@ class TestLooking:
         [found] = rows(run("--json", "scan", "--units", "1-3"))
         assert (found["unit"], found["profile"], found["identification"]) == (1, "gd350", "0x01a0")
         assert "unit 1: gd350" in run("scan", "--units", "1-3").stdout
+        assert run("scan", "-u", "1-2").stdout.splitlines()[1].startswith("1 unit, 1 silent")
+        assert "leave one of them out" in run("scan", "-u", "1-2", "--units", "3").stderr
 
     def test_scan_without_an_answer_exits_3(self) -> None:
         result = run("scan", "--units", "5-6")
         assert result.exit_code == 3
         assert "no unit answered" in result.stderr
+        assert f"`drivebus --port '{SIM}' scan --search`" in result.stderr
 
     def test_info(self) -> None:
         first, *control = rows(run("--json", "info"))

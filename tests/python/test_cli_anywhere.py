@@ -84,8 +84,8 @@ def test_what_is_moved(words: list[str], expected: list[str]) -> None:
 @pytest.mark.parametrize("width", ["40", "80", "200"])
 def test_the_help_cuts_nothing_and_has_every_command(width: str) -> None:
     result = CliRunner().invoke(cli, ["--help"], env={"COLUMNS": width})
-    commands = result.stdout.split("Look:")[1]
+    commands = result.stdout.split("Inspect:")[1]
     assert "..." not in commands
     assert all(f"\n  {name} " in commands for name in cli.commands)
-    for title in ("Move, write:", "Keep:", "Find out:", "Tools:"):
+    for title in ("Move and write:", "Save:", "Find out:", "Listen:", "Tools:"):
         assert f"\n{title}\n" in result.stdout

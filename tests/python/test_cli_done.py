@@ -27,9 +27,9 @@ def test_a_value_may_have_its_unit(typed: str) -> None:
 @pytest.mark.parametrize(
     ("typed", "reason"),
     [
-        ("P00.11=5Hz", "5Hz: not a number of s"),
-        ("P00.11=5ms", "5ms: not a number of s"),
-        ("P00.11=s", "s: not a number of s"),
+        ("P00.11=5Hz", "5Hz: not a number; give it in s"),
+        ("P00.11=5ms", "5ms: not a number; give it in s"),
+        ("P00.11=s", "s: not a number; give it in s"),
     ],
 )
 def test_another_unit_is_refused(typed: str, reason: str) -> None:
@@ -80,3 +80,4 @@ def test_a_value_that_was_confirmed_is_written(monkeypatch: pytest.MonkeyPatch) 
     assert result.exit_code == 0
     assert "P00.11, P00.12: written, but could not be read back: unit 1, read 2100H" in result.stderr
     assert "Acceleration time 1" in result.stdout
+    assert "Kept in RAM until the drive is switched off; --store keeps it in EEPROM." in result.stdout

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import sys
 
 import pytest
 from click.testing import CliRunner, Result
@@ -53,6 +55,24 @@ def test_a_row_has_what_one_needs_to_write_it() -> None:
         "access": "run",
         "label": "Acceleration time 1",
     }
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
+def test_a_small_window_shows_a_line_for_each_row() -> None:
+    from .screens import on_a_terminal
+
+    titles, *listed = on_a_terminal(["--profile", "gd350", "list", "P00"], (80, 24)).lines[1:]
+    assert titles.split() == ["code", "unit", "range", "label"]
+    assert "P00.11  s     0.0 to 3600.0                     Acceleration time 1" in listed
+    assert "P00.06        7 = PID, 8 = Modbus               Where frequency A comes from" in listed
+
+
+def test_a_row_is_described_in_words_and_with_all_for_programmers() -> None:
+    told = run("describe", "P00.11").stdout
+    assert re.search(r"^range +0\.0 to 3600\.0$", told, re.MULTILINE)
+    assert re.search(r"^writable +any time$", told, re.MULTILINE)
+    assert "high first" not in told
+    assert re.search(r"^high first +no$", run("describe", "P00.11", "--all").stdout, re.MULTILINE)
 
 
 def test_a_group_that_is_none_names_those_there_are() -> None:

@@ -171,7 +171,7 @@ class TestDescribe:
         for text, name in (("out_curent", "output_current"), ("amps", "output_current"), ("P14-04", "P14.04")):
             assert name in [row["code"] or row["name"] for row in rows("--profile", EX9, "describe", text)][:3]
         found = run("--profile", "gd350", "describe", "dc", "link").stdout
-        assert found.startswith('gd350 has nothing that is called so, and 2 near matches for "dc link":')
+        assert found.startswith('gd350 has nothing called that, but 2 near matches for "dc link":')
 
     def test_nothing_that_comes_near(self) -> None:
         result = run("--profile", EX9, "describe", "frobnicate")
@@ -268,11 +268,16 @@ HINT = "No proved register of this family has the frequency; --unverified shows 
 class TestSureness:
     """Each family says what it is as far as its manuals go, and no command falls over what is not known of it."""
 
-    def test_a_status_without_a_state_says_how_to_see_one(self) -> None:
-        hint = "`--unverified` also shows what no document of this family proves."
+    def test_a_status_shows_what_is_assumed_and_says_so(self) -> None:
+        hint = "! assumed: no document of this family proves it; --unverified uses it for commands too."
         for words, told_so in (([], True), (["--unverified"], False)):
             result = at("vfd500", "--profile", "vfd500", *words, "status")
             assert (hint in result.stdout) == told_so
+            assert ("stopped !" in result.stdout) == told_so
+        [told] = [
+            json.loads(line) for line in at("vfd500", "--profile", "vfd500", "--json", "status").stdout.splitlines()
+        ]
+        assert (told["state"], told["assumed"]["state"]) == ("unknown", "stopped")
 
     @pytest.mark.parametrize("family", drivebus.profiles())
     @pytest.mark.parametrize("command", [["info"], ["status"], ["faults"], ["monitor", "--count", "1"], ["scan"]])

@@ -21,7 +21,7 @@ from .odd_slave import framed, good, on_a_socket, on_a_terminal
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="pseudo-terminals")
 
-RESERVED = "the specification reserves it: give --reserved if a unit has it all the same"
+RESERVED = "the specification reserves it: give --reserved if a unit has it anyway"
 BEHIND = "a gateway hands on what is written to it to every unit behind it: if it is a device, give --reserved"
 
 
@@ -245,14 +245,14 @@ def test_the_file_says_so_of_a_line(tmp_path: Path) -> None:
             "",
             250,
             "not a whole number from 1 to 247; the specification reserves it: say reserved = true in [lines.hall] if a "
-            "unit has it all the same",
+            "unit has it anyway",
         ),
         (
             "socket://h:1",
             "reserved = false",
             248,
             "not a whole number from 1 to 247; the specification reserves it: say reserved = true in [lines.hall] if a "
-            "unit has it all the same",
+            "unit has it anyway",
         ),
         (
             "/dev/ttyUSB0",

@@ -125,6 +125,9 @@ LIVE = {"monitor", "monitor of two", "panel", "panel of two"}
 AS_GIVEN = {"completion"}
 """What prints a file for another program, whatever the width."""
 
+FEWER_COLUMNS = {"list a group"}
+"""What goes without columns in a small window: the codes there stand for the names."""
+
 COLOUR = re.compile(r"\b(3|4|9|10)[0-8]\b")
 """In a sequence that styles text; bold and faint are none, and 39 and 49 are the terminal's own."""
 
@@ -190,7 +193,7 @@ def test_each_command_fits_its_window(name: str, folder: Path) -> None:
             assert not re.search(r"\w(…|\.\.\.)$", each.text, re.MULTILINE), each.text
     # A name that is broken cannot be typed.
     small, large = (set(re.findall(r"\w+_\w+", each.text)) for each in (seen[USUAL[0]], seen[USUAL[1]]))
-    assert name in LIVE | AS_GIVEN or large <= small, large - small
+    assert name in LIVE | AS_GIVEN | FEWER_COLUMNS or large <= small, large - small
 
 
 def test_no_command_is_left_out() -> None:

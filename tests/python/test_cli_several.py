@@ -77,7 +77,9 @@ def test_each_drive_answers_under_its_name() -> None:
     told = records(run("--port", "hall", "-u", "1-2", "--json", "read", "P00.11"))
     assert [(each["drive"], each["value"]) for each in told] == [("unit 1", 1.0), ("unit 2", 1.0)]
     shown = run("status", "-d", "pump2", "-d", "pump1").stdout
-    assert re.findall(r"^(pump\d)$", shown, re.MULTILINE) == ["pump2", "pump1"]
+    assert re.findall(r"^(pump\d): stopped, 0\.00 of .* Hz.* V", shown, re.MULTILINE) == ["pump2", "pump1"], (
+        "a line each"
+    )
 
 
 @pytest.mark.usefixtures("line")
@@ -136,10 +138,22 @@ def test_read_only_is_of_each_drive(line: drivebus.Simulator) -> None:
 
 @pytest.mark.usefixtures("line")
 def test_a_command_for_one_drive_says_so() -> None:
-    ended = run("-d", "pumps", "backup", "x.toml")
+    ended = run("-d", "pumps", "discover", "x")
     assert ended.exit_code == 2
-    assert "`backup` takes one drive at a time, and these are named: pump1, pump2" in ended.stderr
+    assert ended.stderr == "Error: `discover` takes one drive at a time, and these are named: pump1, pump2\n"
+    assert not Path("x").exists()
+
+
+@pytest.mark.usefixtures("line")
+def test_backups_of_several_drives_are_files_of_a_folder() -> None:
+    ended = run("-d", "pumps", "backup", "x.toml")
+    assert (ended.exit_code, ended.stderr) == (
+        2,
+        "Error: several drives have a file each: give a folder for them, such as x\n",
+    )
     assert not Path("x.toml").exists()
+    assert run("-d", "pumps", "backup", "x").exit_code == 0
+    assert [drivebus.Backup.load(f"x/pump{unit}.toml").origin.unit for unit in (1, 2)] == [1, 2]
 
 
 @pytest.mark.parametrize("option", ["--port x", "--unit 2", "--baud 9600", "--format 8N1", "--rs485 rts"])

@@ -62,10 +62,21 @@ def test_the_help_shows_how_the_line_is_set_and_that_works() -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [["--fault", "late"], ["--fault", "latest=0.1"], ["--faults", "2"], ["--units", "1=gd350,1=gd350"]]
+    ("words", "said"),
+    [
+        (["--fault", "late"], "write KIND=RATE"),
+        (["--fault", "latest=0.1"], "latest"),
+        (["--faults", "2"], "2"),
+        (["--units", "1=gd350,1=gd350"], "unit 1 is given twice"),
+        (["1=gd350,1=gd350"], "unit 1 is given twice"),
+        (["vfd500", "--fault", "late"], "write KIND=RATE"),
+        (["vfd501"], "No such command 'vfd501'"),
+    ],
 )
-def test_sim_takes_no_other_words(words: list[str]) -> None:
-    assert CliRunner().invoke(cli, ["sim", *words]).exit_code == 2
+def test_sim_takes_a_family_and_no_other_words(words: list[str], said: str) -> None:
+    result = CliRunner().invoke(cli, ["sim", *words])
+    assert result.exit_code == 2
+    assert said in result.stderr
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no pty")

@@ -55,7 +55,7 @@ def test_each_view_has_what_it_is_for(simulator: Simulator, tmp_path: Path, size
     with on_a_terminal(words, tmp_path / "record", size, environment={"NO_COLOR": "1"} if plain else {}) as terminal:
         # Who is not known for sure, and who is silent, is told from who is in fault.
         terminal.until(
-            "4 drives, 1 in fault, 1 silent", "537.0", "fault, OV3 (9)", "not known; name it: --profile 2=vfd500"
+            "4 drives, 1 in fault, 1 silent", "537.0", "fault, OV3 (9)", "not known; Enter: use it as vfd500"
         )
         keep("overview", terminal.lines, size)
         terminal.press("\x1b[F")
@@ -63,7 +63,11 @@ def test_each_view_has_what_it_is_for(simulator: Simulator, tmp_path: Path, size
         terminal.press("\x1b[H", "\x1b[B")
         terminal.until("not known, trying again: unit 2 answers", "give `--profile 2=vfd500`")
         terminal.press("\r")
+        terminal.until("answers like a vfd500", "Use it as a vfd500?", "y yes, it is a vfd500")
+        terminal.press("n" if plain else "y")
         terminal.until("2 of 4", "exchanges brought an answer; 0 silent")
+        if not plain:
+            terminal.until("Veikong VFD500 on ", "taken as a vfd500 until this panel ends")
         terminal.press("\x1b")
         terminal.until("4 drives")
         terminal.press("\x1b[H", "\r")

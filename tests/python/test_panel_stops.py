@@ -202,7 +202,7 @@ def test_a_stop_takes_back_a_start_that_was_just_allowed(simulator: Simulator, t
         terminal.press("q")
         # A start that went out has a thread of its own, which proves its stop too: until then the panel asks.
         with suppress(AssertionError):  # it has ended
-            terminal.until("Leave it?")
+            terminal.until("and quit?")
             terminal.press("y")
         assert terminal.ends() == 0
 
@@ -276,7 +276,7 @@ MISTAKE = (
 
 def leave(terminal: Terminal) -> None:
     terminal.press("q")
-    terminal.until("Leave it?")
+    terminal.until("and quit?")
     terminal.press("y")
 
 

@@ -127,8 +127,8 @@ def test_serial_settings_and_motor_data_only_where_that_is_asked(drive: Drive, s
     report = drive.restore(kept)
     left = {item.code: item.reason for item in report.having("skipped") if item.before != item.wanted}
     assert [item.code for item in report.having("restored")] == ["P00.11"]
-    assert left["P14.03"].startswith("a setting of the serial line")
-    assert left["P02.06"].startswith("data of the motor")
+    assert left["P14.03"].startswith("serial setting: restored only with serial=True")
+    assert left["P02.06"].startswith("motor data: restored only with motor=True")
     assert report.ok
     assert [item.code for item in drive.restore(kept, serial=True).having("restored")] == ["P14.03"]
     assert [item.code for item in drive.restore(kept, motor=True).having("restored")] == ["P02.06"]

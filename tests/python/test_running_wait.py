@@ -115,8 +115,18 @@ def test_a_block_that_fails_raises_that_all_the_same(simulator: Simulator, block
 
 
 def test_a_drive_that_tripped_is_told_of(simulator: Simulator, block: Block) -> None:
-    with pytest.raises(Unconfirmed, match="unit 1 tripped while waiting: OL1"):
+    with pytest.raises(Unconfirmed, match="unit 1 tripped before the wait: OL1"):
         block(simulator, lambda: simulator.drive(1).trip("OL1"), {"wait": True})
+
+
+def test_a_reset_that_the_drive_ignores_says_which_setting_is_wrong() -> None:
+    with drivebus.Bus("sim://ms300?clock=virtual") as bus:
+        drive = bus.drive(1, "ms300", unverified=True)
+        assert bus.simulator is not None
+        bus.simulator.drive(1).trip(1)
+        told = r"unit 1 did not reset: it does not take commands from the bus \(00-21 is 0, needs 2\)\. .* sent once"
+        with pytest.raises(Unconfirmed, match=told):
+            drive.reset_fault()
 
 
 def test_a_line_that_fails_meanwhile_leaves_a_motor_that_was_told_to_stop(

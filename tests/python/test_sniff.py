@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
@@ -15,14 +16,17 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from rich.console import Console
 
 import drivebus
 from drivebus import Exchange
 from drivebus.capture import Captured, Writer, read
 from drivebus.cli import cli
 from drivebus.cli.capture_file import CaptureFile
+from drivebus.cli.present.sniff_table import SniffTable
 from drivebus.sim import Simulator
 from drivebus.sniffer import Families, Figures, exchanges_in
+from drivebus.sniffer.statistics import RegisterFigures, UnitFigures
 
 LINE = drivebus.SerialFormat(parity="N")
 
@@ -441,3 +445,20 @@ def test_a_reader_that_goes_ends_it_quietly(simulator: Simulator) -> None:
             bus.read(1, 0x2100)
         assert process.stderr is not None
         assert "Traceback" not in process.stderr.read()
+
+
+def test_the_table_shows_what_was_heard_before_under_the_names_that_were_learned() -> None:
+    figures = Figures(0.002)
+    figures.units[1] = UnitFigures(
+        registers={
+            0x3000: RegisterFigures(reads=2, value=1000, first=1.0, last=2.0),
+            0x2101: RegisterFigures(reads=1, value=1, first=1.0, last=1.0),
+            "running_frequency": RegisterFigures(reads=1, value=12.5, first=3.0, last=3.0),
+        }
+    )
+    screen = io.StringIO()
+    Console(file=screen, width=120, height=20).print(SniffTable("line", Families("gd350"), figures))
+    rows = [line.split() for line in screen.getvalue().splitlines() if line.strip()]
+    assert ["1", "running_frequency", "12.50", "Hz", "3", "1.00", "s"] in rows
+    [bits] = [" ".join(row) for row in rows if "status_word_2" in row]
+    assert bits.startswith("1 status_word_2 1 ready")

@@ -129,7 +129,7 @@ class TestBehindAGateway:
         self.loses(virtual, monkeypatch, CONTROL)
         with (
             pytest.raises(
-                Unconfirmed, match=r"run_forward was sent.*the motor may turn.*State seen afterwards: forward"
+                Unconfirmed, match=r"run forward was sent.*the motor may turn.*State seen afterwards: forward"
             ),
             virtual_drive.running(5.0),
         ):

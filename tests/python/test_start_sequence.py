@@ -152,7 +152,7 @@ def test_a_drive_that_is_stuck_gets_no_further_word(
         "armed off and not on",
         "warm on and not off",
         "within 0.5 s",
-        "run_forward was not sent",
+        "run forward was not sent",
         "then start it again",
     ):
         assert said in told
@@ -269,7 +269,7 @@ def test_a_confirmation_that_is_lost_is_not_asked_for_again(line: Simulator, dri
     skip = sum(frame[:4] != b"\x01\x06\x90\x00" for frame in start_of(line, drive))
     line.line.script([(skip + 1, "silence")])
     with pytest.raises(
-        Unconfirmed, match=r"not started: arm \(0003H\) was sent and not confirmed .*run_forward was not sent"
+        Unconfirmed, match=r"not started: arm \(0003H\) was sent and not confirmed .*run forward was not sent"
     ):
         drive.run(hz=20.0)
     assert commanded(line).count(RUN) == 1, "that of the start before"

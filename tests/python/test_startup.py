@@ -132,6 +132,7 @@ def test_a_stop_is_sent_before_anything_is_loaded_that_it_does_not_need() -> Non
                 "registry",
                 "session",
                 "suspension",
+                "wrong_use",
             )
         ),
     }

@@ -202,7 +202,7 @@ class TestAFallThatProvesNothing:
         at_speed(drive)
         drive.setpoint = 10.0
         drive.bus.sleep(0.5)
-        with pytest.raises(Unconfirmed, match=r"jog_stop was sent.*forward, at 10 Hz"):
+        with pytest.raises(Unconfirmed, match=r"jog stop was sent.*forward, at 10 Hz"):
             drive.jog_stop()
 
     def test_a_coast_that_is_not_obeyed(self, drive: Drive) -> None:
@@ -210,7 +210,7 @@ class TestAFallThatProvesNothing:
         at_speed(drive)
         drive.setpoint = 10.0
         drive.write(OTHER_BUS, unverified=True)
-        with pytest.raises(Unconfirmed, match=r"coast was sent.*may still be fed.*forward, at 10 Hz"):
+        with pytest.raises(Unconfirmed, match=r"coast was sent.*may still be powered.*forward, at 10 Hz"):
             drive.coast()
 
     def test_a_speed_that_wobbles(self, drive: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -417,6 +417,6 @@ class TestAMotorThatRunsInAFault:
         assert self.told == []
 
     def test_a_reset_that_changes_nothing_is_not_confirmed(self, drive: Drive) -> None:
-        with pytest.raises(Unconfirmed, match=r"reset_fault was sent.*forward, in fault"):
+        with pytest.raises(Unconfirmed, match=r"fault reset was sent.*forward, in fault"):
             drive.reset_fault()
         assert self.told == [8]

@@ -56,7 +56,7 @@ def test_a_command_that_has_no_effect_is_unconfirmed(
     # Commands from a bus that is not this one: the state words say "communication", and the drive does not obey.
     virtual_drive.write("P00.02", 1, unverified=True)
     began = virtual_bus.now()
-    with pytest.raises(drivebus.Unconfirmed, match=r"run_forward was sent to unit 1.*stopped"):
+    with pytest.raises(drivebus.Unconfirmed, match=r"run forward was sent to unit 1.*stopped"):
         virtual_drive.run(hz=10.0, confirm=2.0)
     assert virtual_bus.now() - began == pytest.approx(2.0, abs=2 * LOOK)
     virtual_drive.run(hz=10.0, confirm=0)
@@ -67,7 +67,7 @@ def test_a_motor_that_does_not_turn_round_is_told(virtual: Simulator, virtual_dr
     virtual_drive.run(hz=10.0)
     virtual_drive.wait_for_speed(timeout=60)
     virtual_drive.write("P00.02", 1, unverified=True)  # as above: the next command has no effect
-    with pytest.raises(drivebus.Unconfirmed, match=r"run_reverse was sent to unit 1.*forward"):
+    with pytest.raises(drivebus.Unconfirmed, match=r"run reverse was sent to unit 1.*forward"):
         virtual_drive.run(hz=10.0, reverse=True)
     assert virtual.drive(1).state == "forward"
 
@@ -76,7 +76,7 @@ def test_a_trip_instead_of_a_start_is_told_at_once(virtual: Simulator, virtual_b
     virtual.drive(1).load = 4.0
     virtual_drive.write("P00.11", 0.1)
     began = virtual_bus.now()
-    with pytest.raises(drivebus.Unconfirmed, match=r"run_forward was sent.*OL1"):
+    with pytest.raises(drivebus.Unconfirmed, match=r"run forward was sent.*OL1"):
         virtual_drive.run(hz=50.0, confirm=60.0)
     assert virtual_bus.now() - began < 30.0
     assert commands(virtual) == [FORWARD]

@@ -236,7 +236,7 @@ class TestADriveThatMagnetisesTheMotor:
             return read(unit, address, count, **how)
 
         monkeypatch.setattr(bus, "read", shown)
-        with pytest.raises(drivebus.Unconfirmed, match=rf"{command} was sent.*pre exciting"):
+        with pytest.raises(drivebus.Unconfirmed, match=rf"{command.replace('_', ' ')} was sent.*pre exciting"):
             getattr(drive, command)()
         assert len(bus.calls("write")) == 1
         state[STATE] = STOPPED
@@ -285,7 +285,7 @@ class TestWhatIsSaid:
     def test_a_port_that_is_lost_before_the_state_shows_it(self, bus: StandIn, drive: Drive) -> None:
         drive.state()
         bus.failures = [None, drivebus.PortError("gone")]
-        with pytest.raises(drivebus.Unconfirmed, match=r"gone.*may still be fed.*0\.0 s ago: stopped"):
+        with pytest.raises(drivebus.Unconfirmed, match=r"gone.*may still be powered.*0\.0 s ago: stopped"):
             drive.coast()
 
 

@@ -103,7 +103,7 @@ def test_what_follows_an_unconfirmed_direction_is_not_sent(
             raise NoAnswer("unit 1 is silent", unit=unit, started=1.0)
 
     monkeypatch.setattr(Bus, "write", lost)
-    with pytest.raises(Unconfirmed, match="run_reverse was sent"):
+    with pytest.raises(Unconfirmed, match="run reverse was sent"):
         drive.run(reverse=True)
     assert written(simulator) == ["05 00 01 FF 00"]
     assert simulator.drive(1).state == "stopped"
@@ -120,7 +120,7 @@ def test_a_stop_between_direction_and_run_is_the_last_word(
             bus.drive(unit, "wj200", unverified=True).stop()
 
     monkeypatch.setattr(Bus, "write", stopped)
-    with pytest.raises(Unconfirmed, match=r"told to stop .* coil 0001H.* the rest of run_reverse was not sent"):
+    with pytest.raises(Unconfirmed, match=r"told to stop .* coil 0001H.* the rest of it was not sent"):
         drive.run(reverse=True)
     assert written(simulator) == ["05 00 01 FF 00", "05 00 00 00 00"]
     assert simulator.drive(1).state == "stopped"

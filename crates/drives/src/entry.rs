@@ -229,8 +229,8 @@ pub enum AccessError {
     },
     /// The family has no write to RAM only, or none is known.
     #[error(
-        "{name} ({label}) can only be stored (store=True, `--store`): no write that RAM alone keeps is known for this \
-         family, and every write may wear EEPROM"
+        "{name} ({label}) can only be stored: no write that RAM alone keeps is known for this family, and every write \
+         may wear EEPROM"
     )]
     NoRam {
         /// What was to be written.

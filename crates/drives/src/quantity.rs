@@ -188,7 +188,12 @@ impl Quantity {
         }
         let (name, value) = (name.to_owned(), input.to_string());
         Err(match closest(&text, self.choices.values().map(String::as_str)) {
-            Some(closest) => ValueError::UnknownChoice { name, value, closest: closest.to_owned() },
+            Some(closest) => ValueError::UnknownChoice {
+                name,
+                value,
+                closest: closest.to_owned(),
+                choices: self.choices.iter().map(|(number, label)| format!("{number} = {label}")).collect(),
+            },
             None => ValueError::NotANumber { name, value, unit: self.unit().to_owned() },
         })
     }

@@ -64,14 +64,29 @@ pub(crate) fn closest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>)
 
 /// The candidate that `name` is most likely a misspelling of; `None` where none is near.
 ///
-/// One letter of three may be wrong, and of a word of three none.
+/// As many letters may be wrong as [`a_third`] says.
 pub(crate) fn near<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    within(name, candidates, a_third)
+}
+
+/// The candidate closest to `name`, if no more letters are wrong than `wrong` says of a word of so many.
+pub(crate) fn within<'a>(
+    name: &str,
+    candidates: impl Iterator<Item = &'a str>,
+    wrong: fn(usize) -> usize,
+) -> Option<&'a str> {
     let letters: Vec<char> = name.to_lowercase().chars().collect();
-    let wrong = match letters.len() {
-        ..=3 => 0,
-        len => (len + 1) / 3,
-    };
-    closest(name, candidates).filter(|candidate| distance(&letters, &candidate.to_lowercase()) <= wrong)
+    closest(name, candidates).filter(|candidate| distance(&letters, &candidate.to_lowercase()) <= wrong(letters.len()))
+}
+
+/// One letter of three may be wrong, and of a word of three none.
+pub(crate) fn a_third(letters: usize) -> usize {
+    if letters > 3 { (letters + 1) / 3 } else { 0 }
+}
+
+/// One letter may be wrong, and of a word of three none.
+pub(crate) fn one(letters: usize) -> usize {
+    usize::from(letters > 3)
 }
 
 /// Whether the letters of `part` stand in `whole` in their order; two of them say nothing.

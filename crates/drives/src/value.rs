@@ -107,7 +107,7 @@ impl fmt::Display for Input<'_> {
 #[non_exhaustive]
 pub enum ValueError {
     /// The value is no number, and the quantity has no choices.
-    #[error("{name} = {value}: not a number{}", of(unit))]
+    #[error("{name} = {value}: not a number{}", in_unit(unit))]
     NotANumber {
         /// What was to be set.
         name: String,
@@ -117,7 +117,7 @@ pub enum ValueError {
         unit: String,
     },
     /// The value is neither a number nor one of the choices.
-    #[error("{name} = {value}: neither a number nor a known choice; the closest is \"{closest}\"")]
+    #[error("{name} = {value}: neither a number nor a known choice; {}", known_choices(closest, choices))]
     UnknownChoice {
         /// What was to be set.
         name: String,
@@ -125,6 +125,8 @@ pub enum ValueError {
         value: String,
         /// The label closest to it.
         closest: String,
+        /// The choices, each with its number: `2 = communication`.
+        choices: Vec<String>,
     },
     /// The value takes two words, and can only be read.
     #[error("{name} takes two words, and can only be read")]
@@ -176,8 +178,19 @@ fn spaced(unit: &str) -> String {
     if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
-fn of(unit: &str) -> String {
-    if unit.is_empty() { String::new() } else { format!(" of {unit}") }
+fn in_unit(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!("; give it in {unit}") }
+}
+
+/// Choices that a message lists at most.
+const LISTED: usize = 12;
+
+fn known_choices(closest: &str, choices: &[String]) -> String {
+    if choices.len() > LISTED {
+        format!("the closest is \"{closest}\"")
+    } else {
+        format!("known: {}", choices.join(", "))
+    }
 }
 
 /// The values that a quantity allows.

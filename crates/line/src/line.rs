@@ -170,6 +170,16 @@ pub struct PortError {
 impl PortError {
     /// An error of `kind` on `port`; `message` says what happened and what to do.
     pub fn new(kind: PortErrorKind, port: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { kind, port: port.into(), message: message.into() }
+        Self { kind, port: port.into(), message: without_numbers(message.into()) }
     }
+}
+
+/// `message` without the numbers that Rust puts behind what the system says: ` (os error 13)`.
+fn without_numbers(mut message: String) -> String {
+    const BEGIN: &str = " (os error ";
+    while let Some(begin) = message.find(BEGIN) {
+        let Some(length) = message[begin..].find(')') else { break };
+        message.replace_range(begin..=begin + length, "");
+    }
+    message
 }

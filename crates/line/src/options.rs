@@ -124,7 +124,7 @@ impl BusOptions {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Share {
-    /// Who opens the port first has it and serves the others; who comes next uses it through that one.
+    /// The first program to open the port owns it and serves the others; later ones go through it.
     #[default]
     Auto,
     /// As `Auto`, but nobody is served where this program has the port.

@@ -361,7 +361,7 @@ def _by_way_of(codes: Sequence[str]) -> Text:
 
 def _unproved(reason: str) -> Text:
     return Text(
-        f"it is not what the drive told, and what it means is not verified: {reason.rstrip('.')}. With ",
+        f"it is not what the drive told, and what it means is not verified: {reason.rstrip('.')}. Use ",
         argument("unverified", True),
-        " it is written nevertheless",
+        " to write it anyway",
     )

@@ -70,13 +70,11 @@ class Rules:
     def unasked(self, code: str, *, serial: bool, motor: bool, raw: Collection[str] = ()) -> str | None:
         """Why *code* is not given back unless that is asked for; None if it is."""
         if code not in raw and self.is_raw(code):
-            return Text(
-                "what it means is not known; given back only by its name, with ", argument("raw", written="[…]")
-            )
+            return Text("what it means is not known: restored only by its name, with ", argument("raw", written="[…]"))
         if not serial and self.is_serial(code):
-            return "a setting of the serial line; given back only where that is asked for"
+            return Text("serial setting: restored only with ", argument("serial", True))
         if not motor and _among(code, self._motor):
-            return "data of the motor; given back only where that is asked for"
+            return Text("motor data: restored only with ", argument("motor", True))
         return None
 
     def is_raw(self, code: str) -> bool:

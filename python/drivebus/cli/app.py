@@ -25,6 +25,7 @@ from drivebus.cli.present.help_format import first_sentence
 from drivebus.cli.present.output import Output, laid_out, printable, remark
 from drivebus.cli.registry import GROUPS, Commands
 from drivebus.cli.session import DEFAULT_BAUD, DEFAULT_FORMAT, Session, parse_format
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["cli", "main"]
 
@@ -261,13 +262,13 @@ def cli(
     Start with `drivebus demo` (no hardware), then `drivebus ports` and `drivebus --port … scan`.
     """
     if trust_profile and profile is None:
-        raise click.UsageError("--trust-profile is for a profile that is named: give --profile too")
+        raise WrongUse("--trust-profile is for a profile that is named: give --profile too")
     if trace:
         from drivebus.cli.present.frames import show_frames
 
         show_frames(context)
     if capture is not None and os.path.exists(capture):  # noqa: PTH110 - pathlib would be loaded for a stop
-        raise click.UsageError(f"{capture} is there already; give --capture another name")
+        raise WrongUse(f"{capture} is there already; give --capture another name")
     out = Output(as_json)
     base = Session(
         port,
@@ -287,7 +288,7 @@ def cli(
     context.obj = chosen(context, base, drives, units, config)
     ports = sorted({str(each.port) for each in context.obj.several})
     if capture is not None and len(ports) > 1:
-        raise click.UsageError(f"--capture keeps one line, and these drives are on several: {', '.join(ports)}")
+        raise WrongUse(f"--capture keeps one line, and these drives are on several: {', '.join(ports)}")
 
 
 def main() -> None:

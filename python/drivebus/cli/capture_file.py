@@ -9,12 +9,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO
 
-import click
-
 import drivebus
 from drivebus.capture import Captured, Writer
 from drivebus.capture.standing import LOOK, Standing
 from drivebus.cli.present.output import remark
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["CaptureFile"]
 
@@ -100,7 +99,7 @@ class CaptureFile:
                 raise FileExistsError
             return self._path.open("r+b" if self._path.is_file() else "wb")
         except FileExistsError:
-            raise click.UsageError(f"{target} is there already; give another name, or --force") from None
+            raise WrongUse(f"{target} is there already; give another name, or --force") from None
         except OSError as error:
             raise drivebus.NotAllowed(f"{target} cannot be written: {error.strerror}; nothing was opened") from None
 

@@ -9,6 +9,7 @@ import click
 from rich.progress import BarColumn, Progress, TextColumn
 
 import drivebus
+from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.output import Output
 from drivebus.cli.session import EXAMPLE_PORT
 
@@ -87,9 +88,9 @@ class _Job:
         try:
             drive.run(10.0)
         except drivebus.NotAllowed as error:
-            self.out.say(f"run(10.0) is refused before it is sent: {error}")
+            self.out.say(f"A start is refused before it is sent: {in_commands(error)}")
         else:
-            self.expect(False, "run() is refused")
+            self.expect(False, "a start is refused")
         self.title("Set it to obey the bus, in RAM, and its ramps to 15 s")
         after = drive.prepare_control()
         self.out.say(str(after))
@@ -122,7 +123,8 @@ class _Job:
     def watch(self, drive: drivebus.Drive) -> None:
         self.title("All its monitor registers, in two reads")
         values = drive.monitor()
-        rows = [[name, value, values.units[name], drive.describe(name).label] for name, value in values.items()]
+        known = {name: drive.describe(str(name)) for name in values}
+        rows = [[name, known[name].text(value), known[name].unit, known[name].label] for name, value in values.items()]
         self.out.rows(["register", "value", "unit", "what"], rows)
         self.out.say(f"Read in {values.duration * 1000:.1f} ms.")
 

@@ -14,6 +14,7 @@ from click.shell_completion import CompletionItem
 import drivebus
 from drivebus.cli.names import parse_units
 from drivebus.cli.session import Session
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.line.addresses import EVERYBODY
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def chosen(context: click.Context, base: Session, names: Sequence[str], units: s
     if names:
         for parameter, option in _NOT_WITH_NAMES.items():
             if context.get_parameter_source(parameter) is ParameterSource.COMMANDLINE:
-                raise click.UsageError(f"--drive says where the drive is: leave {option} out", context)
+                raise WrongUse(f"--drive says where the drive is: leave {option} out", context)
         drives = find_site(file, needed=True).select(names)
         sessions = [of_drive(base, drive) for drive in drives]
     else:
@@ -76,9 +77,7 @@ def find_site(file: str | None, needed: bool = False) -> Site:
     if place is not None:
         return Site.load(place)
     if needed:
-        raise click.UsageError(
-            f"there is neither {places[0]} in this folder nor {places[1]}: --drive takes names from there"
-        )
+        raise WrongUse(f"there is neither {places[0]} in this folder nor {places[1]}: --drive takes names from there")
     return Site(places[0], {}, {}, {})
 
 

@@ -10,6 +10,7 @@ from click.shell_completion import CompletionItem
 import drivebus
 from drivebus.cli.option_types import with_a_point
 from drivebus.cli.present.error_wording import in_commands
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.line.addresses import EVERYBODY, Addresses
 
 __all__ = [
@@ -41,9 +42,9 @@ def resolve(profile: drivebus.Profile, text: str, *, written: bool = False) -> s
     An unknown name stays what it is: the profile refuses it and names the closest.
     """
     if not text.strip():
-        raise click.UsageError("an empty text is not a name; give one such as output_current, P00.11 or 3004H")
+        raise WrongUse("an empty text is not a name; give one such as output_current, P00.11 or 3004H")
     if "=" in text:
-        raise click.UsageError(f'"{text}" is not a name; `drivebus write {text}` gives something a value')
+        raise WrongUse(f'"{text}" is not a name; `drivebus write {text}` gives something a value')
     match = _ADDRESS.fullmatch(text)
     if match:
         address = int(match[1] or match[2], 16)
@@ -71,9 +72,9 @@ def parse_assignment(text: str) -> tuple[str, int | float | str]:
     name, equals, value = text.partition("=")
     name, value = name.strip(), value.strip()
     if not equals or not name or not value:
-        raise click.UsageError(f'"{text}" is not an assignment; write NAME=VALUE, such as P00.11=5.0')
+        raise WrongUse(f'"{text}" is not an assignment; write NAME=VALUE, such as P00.11=5.0')
     if with_a_point(value):
-        raise click.UsageError(f'"{text}" has a comma in its number{with_a_point(value)}')
+        raise WrongUse(f'"{text}" has a comma in its number{with_a_point(value)}')
     for kind in (lambda digits: int(digits, 0), float):
         try:
             return name, kind(value)
@@ -98,7 +99,7 @@ def parse_hex(parts: tuple[str, ...]) -> bytes:
     try:
         return bytes.fromhex(text)
     except ValueError:
-        raise click.UsageError(
+        raise WrongUse(
             f'"{" ".join(parts)}" is not hexadecimal bytes; write two digits each, such as 01 03 21 00 00 01'
         ) from None
 
@@ -109,18 +110,16 @@ def parse_units(text: str, addresses: Addresses = EVERYBODY) -> list[int]:
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d{1,20})\s*(?:-\s*(\d{1,20})\s*)?", part)
         if match is None:
-            raise click.UsageError(f'"{part}" is not a unit address; write 1-247, or a list such as 1-31,40')
+            raise WrongUse(f'"{part}" is not a unit address; write 1-247, or a list such as 1-31,40')
         first, last = int(match[1]), int(match[2] or match[1])
         # What a line has is without a gap.
         why = addresses.why_not(first) or addresses.why_not(last)
         if why:
             which = "unit" if match[2] is None else "units"
             are = "is" if match[2] is None else "are"
-            raise click.UsageError(
-                f'{which} "{part.strip()}" {are} out of range; allowed is 1 to 247; {in_commands(why)}'
-            )
+            raise WrongUse(f'{which} "{part.strip()}" {are} out of range; allowed is 1 to 247; {in_commands(why)}')
         if first > last:
-            raise click.UsageError(f'units "{part.strip()}": the first is above the last; write {last}-{first}')
+            raise WrongUse(f'units "{part.strip()}": the first is above the last; write {last}-{first}')
         units.extend(range(first, last + 1))
     return units
 
@@ -133,7 +132,7 @@ def parse_families(text: str | None) -> dict[int, str] | str | None:
     for part in text.split(","):
         units, _, name = part.partition("=")
         if not name.strip():
-            raise click.UsageError(f'"{part}" is not a unit and its family; write 3=gd350, or a list such as 1-4=gd350')
+            raise WrongUse(f'"{part}" is not a unit and its family; write 3=gd350, or a list such as 1-4=gd350')
         families |= dict.fromkeys(parse_units(units), name.strip())
     return families
 

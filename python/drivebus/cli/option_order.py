@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import click
 
+from drivebus.cli.wrong_use import WrongUse
+
 __all__ = ["in_front"]
 
 
@@ -34,7 +36,7 @@ def in_front(group: click.Group, context: click.Context, words: Sequence[str]) -
             kept += taken
             continue
         if option in before and not option.multiple:
-            raise click.UsageError(f"{option.opts[0]} is given twice: before the command and behind it", context)
+            raise WrongUse(f"{option.opts[0]} is given twice: before the command and behind it", context)
         moved += taken
     return [*words[:place], *moved, words[place], *kept]
 

@@ -13,17 +13,17 @@ import click
 __all__ = ["GROUPS", "Commands"]
 
 GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
-    "Look": {
+    "Inspect": {
         "commands.inspect": ("ports", "scan", "info", "status", "read"),
         "commands.monitor": ("monitor",),
         "panel": ("panel",),
         "commands.drives": ("drives",),
     },
-    "Move, write": {
+    "Move and write": {
         "commands.motion": ("run", "stop", "coast", "jog", "reset", "prepare", "write"),
         "commands.try_motor": ("try",),
     },
-    "Keep": {
+    "Save": {
         "commands.backup": ("backup", "restore", "diff"),
         "commands.record": ("record",),
         "commands.plot": ("plot",),
@@ -34,7 +34,7 @@ GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
         "commands.discover": ("discover",),
         "commands.profiles": ("profiles",),
     },
-    "Overhear": {"commands.sniff": ("sniff",), "commands.replay": ("replay",)},
+    "Listen": {"commands.sniff": ("sniff",), "commands.replay": ("replay",)},
     "Machines": {"commands.hal": ("hal",)},
     "Tools": {
         "raw": ("raw",),

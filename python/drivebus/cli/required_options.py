@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from drivebus.cli.wrong_use import WrongUse
+
 __all__ = ["NamesAllMissing"]
 
 
@@ -20,7 +22,7 @@ class NamesAllMissing(click.Command):
             missing = [each.opts[0] for each in self.params if each.required and each.name not in known]
             if len(missing) < 2:
                 raise
-            raise click.UsageError(
+            raise WrongUse(
                 f"Missing options {', '.join(missing[:-1])} and {missing[-1]}. An example: `{self._example()}`"
             ) from None
 

@@ -18,6 +18,7 @@ from drivebus.cli.option_types import Seconds
 from drivebus.cli.present.errors import tell_wills
 from drivebus.cli.present.output import Output, remark
 from drivebus.cli.suspension import gives_way_when_held
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.line.addresses import Addresses
 from drivebus.site import forget, known_family, remember
 
@@ -114,9 +115,9 @@ class Session:
         if self.several:
             named = ", ".join(each.called for each in self.several)
             command = click.get_current_context().info_name
-            raise click.UsageError(f"`{command}` takes one drive at a time, and these are named: {named}")
+            raise WrongUse(f"`{command}` takes one drive at a time, and these are named: {named}")
         if self.port is None:
-            raise click.UsageError(
+            raise WrongUse(
                 "no port: give --port or set DRIVEBUS_PORT, or name a drive of drivebus.toml with --drive; "
                 "`drivebus ports` lists what is there"
             )
@@ -160,6 +161,10 @@ class Session:
         """The bus that the options name, opened."""
         port = self.one_port()
         bits, parity, stop = self.line_format
+        if bits != "8":
+            raise WrongUse(
+                f"Modbus RTU has 8 data bits, and --format has {bits}: `{self.doctor()}` finds the right one"
+            )
         settings: dict[str, Any] = {
             "baudrate": self.baud,
             "bytesize": int(bits),
@@ -283,7 +288,7 @@ class Session:
             profile = drivebus.Profile.find(self.profile)
             return profile.with_variants(self.variants) if self.variants else profile
         if self.port is None:
-            raise click.UsageError(
+            raise WrongUse(
                 "the family is not known: give --profile NAME (`drivebus profiles`), or --port to ask a drive"
             )
         with self.drive() as drive:
@@ -307,6 +312,10 @@ class Session:
         if self.profile is not None:
             words.append(f"--profile {shlex.quote(self.profile)}")
         return " ".join([*words, name])
+
+    def for_line(self, name: str) -> str:
+        """The command *name* for the same port, whatever its settings and units, as it can be typed."""
+        return f"drivebus --port {shlex.quote(str(self.port))} {name}"
 
     def setting_words(self) -> list[str]:
         """The options for speed and characters, where they are not as usual."""
@@ -368,7 +377,7 @@ def ask_once(texts: Sequence[str], yes: bool) -> None:
         return
     # Who closed standard input has none at all.
     if sys.stdin is None or not sys.stdin.isatty():
-        raise click.UsageError("without a terminal this needs --yes; nothing was done")
+        raise WrongUse("without a terminal this needs --yes; nothing was done")
     try:
         wanted = click.confirm("Is the machine clear? Go ahead?", err=True)
     except click.Abort:

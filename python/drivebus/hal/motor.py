@@ -148,7 +148,7 @@ class SpindleMotor:
         if not (settings.verified or self._drive.unverified):
             raise Unverified(
                 f"the communication time-out of {profile.title} ({settings.timeout}) is not verified: {settings.note} "
-                "Use it all the same with --unverified, or do without with --no-watchdog. Nothing was sent",
+                "Use it anyway with --unverified, or do without with --no-watchdog. Nothing was sent",
                 unit=self._drive.unit,
             )
         action = next(each for each in _ACTIONS if each in settings.choices)

@@ -72,7 +72,7 @@ class Addresses:
             return f"{_HIGHEST} is a gateway itself, over tcp:// only"
         if self._reserved:
             return ""
-        return Text("the specification reserves it: ", _RESERVED, " if a unit has it all the same")
+        return Text("the specification reserves it: ", _RESERVED, " if a unit has it anyway")
 
 
 EVERYBODY = Addresses(tcp=True, reserved=True)

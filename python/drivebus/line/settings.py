@@ -16,6 +16,7 @@ from drivebus.line.stats import Stats
 from drivebus.line.trace import Trace
 from drivebus.line.units import Units
 from drivebus.sim import Simulator, core_of, lasting_port
+from drivebus.strict_attributes import known_keywords
 
 if TYPE_CHECKING:
     from drivebus.line.pcapng_trace import WireFile
@@ -161,6 +162,7 @@ class BusFace:
     simulator: Simulator | None
     format: SerialFormat
 
+    @known_keywords
     def __init__(
         self,
         port: object,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from drivebus import checks
 from drivebus.advice import Advice, Text, argument, call
-from drivebus.errors import NotReady, Unconfirmed
+from drivebus.errors import BadAnswer, NoAnswer, NotReady, PortError, Refused, Unconfirmed
 from drivebus.operations import parameter_writes, parameters, registers
 from drivebus.operations.by_name import by_name
 from drivebus.operations.drive_view import DriveView
@@ -24,6 +24,7 @@ __all__ = [
     "wanted_always",
     "wanted_for",
     "wanted_of_commands",
+    "why_ignored",
 ]
 
 
@@ -108,7 +109,7 @@ async def check_heeded(unit: DriveView, setpoint: str, register: str) -> None:
                 Advice("prepare_control", setpoint, f'prepare_control(setpoint="{setpoint}")'),
                 " sets it so; ",
                 Advice("write", register, f'write("{register}", …)'),
-                " writes it all the same",
+                " writes it anyway",
             ),
             why="settings",
             unit=unit.address,
@@ -132,6 +133,20 @@ async def check_set(unit: DriveView, wanted: list[Setting], what: str) -> None:
             why="settings",
             unit=unit.address,
         )
+
+
+async def why_ignored(unit: DriveView) -> str:
+    """Which settings keep the drive from taking commands from the bus; empty where none is known to, or none tells."""
+    wanted = [row for row in wanted_of_commands(unit) if row.verified or unit.unverified]
+    try:
+        items = await _check_items(unit, wanted)
+    except (NoAnswer, BadAnswer, Refused, PortError):
+        return ""
+    return ", ".join(
+        f"{item.code} is {int(item.actual)}, needs {int(item.wanted)}"
+        for item in items
+        if item.actual is not None and not item.ok
+    )
 
 
 def wanted_of_commands(unit: DriveView) -> list[Setting]:

@@ -57,11 +57,17 @@ MAY = {
     "jog_forward": "the motor may turn",
     "jog_reverse": "the motor may turn",
     "stop": "the motor may still turn",
-    "coast": "the motor may still be fed",
+    "coast": "the motor may still be powered",
     "jog_stop": "the motor may still turn",
     "reset_fault": "the fault may be reset, and a drive that is still told to run may start",
 }
 """What may have happened when a command was sent and nothing is known of it."""
+
+
+def said(command: str) -> str:
+    """*command* as people say it: `fault reset` for `reset_fault`."""
+    return "fault reset" if command == "reset_fault" else command.replace("_", " ")
+
 
 _WHATEVER_IT_IS = ("reset_fault",)
 """Commands that are given to a unit that contradicts its profile too, as those that halt are: whether a drive gets out
@@ -104,7 +110,7 @@ async def send(unit: DriveView, name: str, words: Words | None = None) -> None:
     await send_word(unit, name, *first)
     halted = Unconfirmed(
         f"unit {unit.address} was told to stop when {first[1]} had been sent to {tables.shown(first[0])}, "
-        f"which comes before {name}; the rest of {name} was not sent",
+        f"which comes before {said(name)}; the rest of it was not sent",
         unit=unit.address,
     )
     if unit.record.halts_begun != before:
@@ -123,8 +129,8 @@ async def send_word(unit: DriveView, name: str, address: int, payload: int | Seq
         if error.why != "halted":
             raise
         raise NotReady(
-            f"unit {unit.address} was told to stop while {name} was under way, or the port went to another program: "
-            f"{name} was not sent. Give it again if it is to be",
+            f"unit {unit.address} was told to stop while {said(name)} was under way, or the port went to another "
+            f"program: {said(name)} was not sent. Give it again if it is still wanted",
             why="halted",
             unit=unit.address,
         ) from error
@@ -132,7 +138,7 @@ async def send_word(unit: DriveView, name: str, address: int, payload: int | Seq
         if error.started is None:
             raise
         raise Unconfirmed(
-            f"{name} was sent to unit {unit.address} and not confirmed ({error}); {MAY[name]}. "
+            f"{said(name)} was sent to unit {unit.address} and not confirmed ({error}); {MAY[name]}. "
             f"{await state_afterwards(unit)}. It was not repeated",
             unit=unit.address,
             **frames_of(error),
@@ -222,14 +228,14 @@ class Proof:
             is_over = False
         except PortError as error:
             raise Unconfirmed(
-                f"{command} was sent to unit {unit.address}; the port was lost before its state showed it ({error}): "
-                f"{MAY[command]}; {state.seen_last(unit)}{_once(command)}",
+                f"{said(command)} was sent to unit {unit.address}; the port was lost before its state showed it "
+                f"({error}): {MAY[command]}; {state.seen_last(unit)}{_once(command)}",
                 unit=unit.address,
             ) from error
         if not is_over and unit.bus.now() < (self._deadline if fall is None else fall.until):
             return False
         raise Unconfirmed(
-            f"{command} was sent to unit {unit.address}, and its state does not show it: {MAY[command]}; {last}"
+            f"{said(command)} was sent to unit {unit.address}, and its state does not show it: {MAY[command]}; {last}"
             f"{_once(command)}",
             unit=unit.address,
         )

@@ -186,7 +186,8 @@ class Halt:
     def _is_another(self, what: str) -> Unconfirmed:
         unit = self.unit
         return Unconfirmed(
-            f"{self.command} was sent to unit {unit.address} and taken; but {what}. {commands.MAY[self.command]}",
+            f"{commands.said(self.command)} was sent to unit {unit.address} and taken; but {what}. "
+            f"{commands.MAY[self.command]}",
             unit=unit.address,
         )
 
@@ -199,9 +200,9 @@ class Halt:
             except LINE_ERRORS as error:
                 if unit.bus.now() >= until or unit.bus.closed:
                     raise Unconfirmed(
-                        f"{self.command} was sent to unit {unit.address} and taken, and what the unit is could not be "
-                        f"asked ({error}): by another family it may mean something else; {commands.MAY[self.command]}; "
-                        f"{state.seen_last(unit)}",
+                        f"{commands.said(self.command)} was sent to unit {unit.address} and taken, and what the unit "
+                        f"is could not be asked ({error}): by another family it may mean something else; "
+                        f"{commands.MAY[self.command]}; {state.seen_last(unit)}",
                         unit=unit.address,
                     ) from error
                 await unit.bus.sleep(_PAUSE)
@@ -235,7 +236,8 @@ class Halt:
         times = f"{self._frames} times within {took:.1f} s" if self._frames != 1 else "once"
         if isinstance(error, Refused):
             return Refused(
-                f"{self.command} was sent to unit {unit.address} {times} and not taken, at last: {error}; {may}. "
+                f"{commands.said(self.command)} was sent to unit {unit.address} {times} and not taken, at last: "
+                f"{error}; {may}. "
                 f"{await commands.state_afterwards(unit, urgent=True)}",
                 code=error.code,
                 name=error.name,
@@ -247,7 +249,7 @@ class Halt:
         if isinstance(error, (NoAnswer, BadAnswer, PortError)):
             if error.started is None:
                 return type(error)(
-                    f"{self.command} could not be sent to unit {unit.address} ({error}); {may}",
+                    f"{commands.said(self.command)} could not be sent to unit {unit.address} ({error}); {may}",
                     unit=unit.address,
                     request=error.request,
                     ended=error.ended,
@@ -256,7 +258,8 @@ class Halt:
             if self._heard is not None:
                 silent = f"the last that came from it came {unit.bus.now() - self._heard:.1f} s ago"
             return Unconfirmed(
-                f"{self.command} was sent to unit {unit.address} {times} and not confirmed ({error}): {silent}; {may}. "
+                f"{commands.said(self.command)} was sent to unit {unit.address} {times} and not confirmed ({error}): "
+                f"{silent}; {may}. "
                 f"{await commands.state_afterwards(unit, urgent=True)}",
                 unit=unit.address,
                 **commands.frames_of(error),

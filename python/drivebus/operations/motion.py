@@ -191,8 +191,8 @@ async def reset_fault(unit: DriveView, *, confirm: float = 1.0, unverified: bool
             port was opened again. Nothing was sent.
         Refused: The drive did not take it.
         NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
-        Unconfirmed: It was sent, once, and the fault is still there: its cause is, most likely. Or nothing is
-            known of it.
+        Unconfirmed: It was sent, once, and the fault is still there: its cause is, most likely, or the drive does not
+            obey the bus, which the message says. Or nothing is known of it.
     """
     confirm = checks.number("confirm", confirm, 0.0, 3600.0)
     unit = unit.trusting(unverified)
@@ -208,7 +208,21 @@ async def reset_fault(unit: DriveView, *, confirm: float = 1.0, unverified: bool
 
     await check_harmless(unit, "reset_fault")
     await commands.send(unit, "reset_fault")
-    await commands.confirm(unit, "reset_fault", shows, confirm)
+    try:
+        await commands.confirm(unit, "reset_fault", shows, confirm)
+    except Unconfirmed as error:
+        ignored = await bus_control.why_ignored(unit)
+        if not ignored:
+            raise
+        raise Unconfirmed(
+            Text(
+                f"unit {unit.address} did not reset: it does not take commands from the bus ({ignored}). The reset was "
+                "sent once; ",
+                call("prepare_control"),
+                " sets the drive to obey the bus",
+            ),
+            unit=unit.address,
+        ) from error
 
 
 async def _start(

@@ -194,9 +194,9 @@ def plan_write(unit: DriveView, name: str, value: object, store: bool) -> Planne
         raise BadArgument(
             Text(
                 f"no way to write {name} to RAM alone is known of {unit.profile.title}, so every write may wear its "
-                f"EEPROM; nothing was sent to unit {unit.address}. With ",
+                f"EEPROM; nothing was sent to unit {unit.address}. Use ",
                 argument("store", True),
-                " it is kept there",
+                " to keep it there",
             ),
             unit=unit.address,
         )

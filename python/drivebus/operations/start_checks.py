@@ -62,7 +62,7 @@ async def prove_link(unit: DriveView, force: bool) -> None:
                 f"the link to unit {unit.address} is bad: {link}, and {lost} of {looks} looks at its state failed; "
                 "nothing that moves it was sent, for its stop might be lost as well. Mend the line (",
                 Advice("stats", None, "bus.stats()"),
-                " may say how), or start all the same with ",
+                " may say how), or start anyway with ",
                 argument("force", True),
             ),
             unit=unit.address,

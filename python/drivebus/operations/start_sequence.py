@@ -112,7 +112,7 @@ class _Step:
 
     def _failed(self, why: str, error: NoAnswer | BadAnswer | PortError | None = None) -> Unconfirmed:
         return Unconfirmed(
-            Text(f"unit {self._unit.address} was not started: ", why, f". {self._command} was not sent"),
+            Text(f"unit {self._unit.address} was not started: ", why, f". {commands.said(self._command)} was not sent"),
             unit=self._unit.address,
             request=b"" if error is None else error.request,
             started=None if error is None else error.started,

@@ -182,7 +182,7 @@ async def _status(unit: DriveView, seen: Look) -> Status:
         ("overload_alarm", alarm),
     ):
         if field is None:
-            missing[what] = f"no status word of {unit.profile.title} that may be read has it"
+            missing[what] = f"not available on {unit.profile.title}"
     return Status(
         state=seen.state,
         ready=None if ready is None else ready == "ready",

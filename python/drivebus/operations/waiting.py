@@ -93,12 +93,12 @@ def check_standstill(unit: DriveView, timeout: float) -> None:
 async def _wait(unit: DriveView, reached: Callable[[Status], bool], otherwise: str, timeout: float) -> Status:
     timeout = checks.number("timeout", timeout, 0.0)
     deadline = unit.bus.now() + timeout
+    tripped = "tripped before the wait"
     while True:
         status = await state.status(unit)
         if status.state is State.FAULT or status.fault is not None:
-            raise Unconfirmed(
-                f"unit {unit.address} tripped while waiting: {status.fault or 'fault not named'}", unit=unit.address
-            )
+            raise Unconfirmed(f"unit {unit.address} {tripped}: {status.fault or 'fault not named'}", unit=unit.address)
+        tripped = "tripped while waiting"
         if reached(status):
             return status
         if unit.bus.now() >= deadline:

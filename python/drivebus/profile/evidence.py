@@ -30,9 +30,9 @@ def not_verified(what: str, reason: str | None, unit: int) -> NotAllowed:
         Text(
             f"{what} is not verified: ",
             _sentence(reason),
-            f" Nothing was sent to unit {unit}; with ",
+            f" Nothing was sent to unit {unit}; use ",
             _UNVERIFIED,
-            " it is done nevertheless",
+            " to do it anyway",
         ),
         unit=unit,
     )

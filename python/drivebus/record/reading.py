@@ -16,7 +16,7 @@ from drivebus import checks
 from drivebus._native import read_sheet
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.record.formats import format_of
-from drivebus.record.table import FIXED, seconds_of
+from drivebus.record.table import ELAPSED, FIXED, seconds_of
 
 __all__ = ["Event", "Recording", "read"]
 
@@ -79,7 +79,7 @@ class Recording:
         Raises:
             NotAllowed: A row is none of a recording.
         """
-        valued = [title for title in titles if title not in FIXED]
+        valued = [title for title in titles if title not in (*FIXED, ELAPSED)]
         self.complete = False
         for number, row in enumerate(rows, start=1):
             try:

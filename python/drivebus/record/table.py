@@ -11,10 +11,14 @@ from typing import Any, NamedTuple
 from drivebus.profile import Profile
 from drivebus.values import Choice, Description, Value
 
-__all__ = ["FIXED", "Column", "Recorded", "Row", "Table", "moment", "seconds_of"]
+__all__ = ["ELAPSED", "FIXED", "Column", "Recorded", "Row", "Table", "moment", "seconds_of"]
 
 FIXED = ("time", "drive", "event", "text", "state")
 """The columns in front of the values. `event` is empty where a row has values."""
+
+
+ELAPSED = "t [s]"
+"""The column of CSV files behind those: seconds since the recording began."""
 
 
 class Row(NamedTuple):
@@ -88,6 +92,11 @@ class Table:
         drives: Whose values there are.
         interval: Seconds between two samples of a drive; None: as fast as the line allows.
         version: Of drivebus.
+
+    Attributes:
+        columns: Those of values.
+        titles: Of all columns.
+        began: Unix time in seconds at which the recording began, that is its first file; 0 before.
     """
 
     def __init__(self, drives: Sequence[Recorded], interval: float | None, version: str) -> None:
@@ -98,6 +107,7 @@ class Table:
                 known.setdefault(column.title, column)
         self.columns = list(known.values())
         self.titles = [*FIXED, *known]
+        self.began = 0.0
         self._places = {
             drive.label: [drive.rows.get(column.name) if _owns(drive, column) else None for column in self.columns]
             for drive in drives
@@ -109,7 +119,8 @@ class Table:
         }
 
     def about(self, started: float) -> str:
-        """What is told of a recording that began at *started*, as JSON: drives, lines, profiles, registers."""
+        """What is told of a file that begins at *started*, as JSON: drives, lines, profiles, registers."""
+        self.began = self.began or started
         return json.dumps({"started": moment(started), **self._about}, ensure_ascii=False)
 
     def values(self, label: str, sample: Mapping[str | int, Value]) -> tuple[Value | str | None, ...]:

@@ -45,8 +45,12 @@ pub(super) fn check(file: &File, line: u64, quantity: &Quantity, name: &str, val
 
 pub(super) fn serial(file: &File, serial: &manifest::Serial) -> Result<SerialDefaults, ProfileError> {
     let format = serial.format.get_ref();
-    let (data_bits, parity, stop_bits) = SerialDefaults::parse_format(format)
-        .ok_or_else(|| file.broken(line(file, &serial.format), format!("format \"{format}\" must be like 8E1")))?;
+    let (data_bits, parity, stop_bits) = SerialDefaults::parse_format(format).ok_or_else(|| {
+        file.broken(
+            line(file, &serial.format),
+            format!("format \"{format}\" must be like 8E1; Modbus RTU has 8 data bits"),
+        )
+    })?;
     Ok(SerialDefaults {
         baud_rate: within(file, &serial.baud_rate, 50, 10_000_000, "baud_rate")?,
         data_bits,

@@ -10,14 +10,14 @@ use crate::text::{near, parameter_address, parse_address, parse_code, parse_loos
 #[non_exhaustive]
 pub enum NameError {
     /// Nothing has this name.
-    #[error("{profile} has no \"{name}\"{}", hint(closest))]
+    #[error("{profile} has no \"{name}\"{}", hint(name, closest))]
     Unknown {
         /// The profile that was asked.
         profile: String,
         /// The name as given.
         name: String,
-        /// The name closest to it; empty where none is near.
-        closest: String,
+        /// The names closest to it, the best first; empty where none is near.
+        closest: Vec<String>,
     },
     /// The profile knows nothing at this address.
     #[error("{profile} knows nothing at {address:04X}H; read it by its address without a profile")]
@@ -45,8 +45,30 @@ pub enum NameError {
     },
 }
 
-fn hint(closest: &str) -> String {
-    if closest.is_empty() { String::new() } else { format!("; the closest is \"{closest}\"") }
+/// Names that a message offers at most.
+const OFFERED: usize = 5;
+
+fn hint(name: &str, closest: &[String]) -> String {
+    if let Some(register) = numbered_from_40001(name) {
+        return format!("; {} is register {register:04X}H: name it 0x{register:04X}", name.trim());
+    }
+    match closest {
+        [] => String::new(),
+        [one] => format!("; the closest is \"{one}\""),
+        several => format!("; the closest are \"{}\"", several.join("\", \"")),
+    }
+}
+
+/// The address of a holding register by its number in the count that begins at 40001, or at 400001.
+fn numbered_from_40001(name: &str) -> Option<u16> {
+    let digits = name.trim();
+    let first = match digits.len() {
+        5 => 40_001,
+        6 => 400_001,
+        _ => return None,
+    };
+    let number: u32 = digits.bytes().all(|digit| digit.is_ascii_digit()).then(|| digits.parse().ok()).flatten()?;
+    u16::try_from(number.checked_sub(first)?).ok()
 }
 
 impl Profile {
@@ -87,7 +109,7 @@ impl Profile {
         Err(NameError::Unknown {
             profile: self.name().to_owned(),
             name: name.to_owned(),
-            closest: self.closest(wanted).to_owned(),
+            closest: self.closest(wanted),
         })
     }
 
@@ -107,9 +129,19 @@ impl Profile {
 
     /// What somebody most likely meant by a name that is none: one that is spelt like it, else what a search finds. Empty
     /// where neither is there: any other would mislead.
-    fn closest(&self, name: &str) -> &str {
-        let found = || self.search_exactly(name, 1).first().map(|entry| entry.alias().unwrap_or(entry.name()));
-        near(name, self.entries().flat_map(names)).or_else(found).unwrap_or_default()
+    fn closest(&self, name: &str) -> Vec<String> {
+        if numbered_from_40001(name).is_some() {
+            return Vec::new();
+        }
+        if let Some(near) = near(name, self.entries().flat_map(names)) {
+            return vec![near.to_owned()];
+        }
+        let mut found = self.search_exactly(name, OFFERED);
+        // A code that is not there stands for no other.
+        if found.is_empty() && !name.bytes().any(|letter| letter.is_ascii_digit()) {
+            found = self.search_nearly(name, OFFERED);
+        }
+        found.into_iter().map(|entry| entry.alias().unwrap_or(entry.name()).to_owned()).collect()
     }
 
     fn unknown_address(&self, name: &str, address: u16) -> NameError {

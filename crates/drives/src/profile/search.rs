@@ -3,7 +3,7 @@
 use crate::entry::{Entry, names};
 use crate::profile::Profile;
 use crate::profile::synonyms::SYNONYMS;
-use crate::text::near;
+use crate::text::{a_third, one, within};
 
 /// Nobody types more words than this; more only cost time.
 const MOST_WORDS: usize = 16;
@@ -30,7 +30,13 @@ impl Profile {
         if let Some(entry) = self.find_loosely(text) {
             return std::iter::once(entry).take(limit).collect();
         }
-        let corrected: Vec<String> = words(text).take(MOST_WORDS).map(|word| self.corrected(word)).collect();
+        let corrected: Vec<String> = words(text).take(MOST_WORDS).map(|word| self.corrected(word, a_third)).collect();
+        self.search_words(&corrected, limit)
+    }
+
+    /// The entries in which all words of `text` occur, but for a wrong letter in each.
+    pub(crate) fn search_nearly(&self, text: &str, limit: usize) -> Vec<&Entry> {
+        let corrected: Vec<String> = words(text).take(MOST_WORDS).map(|word| self.corrected(word, one)).collect();
         self.search_words(&corrected, limit)
     }
 
@@ -56,7 +62,7 @@ impl Profile {
     }
 
     /// `word`, or where it occurs nowhere the nearest that does. A code that is not there stands for no other.
-    fn corrected(&self, word: String) -> String {
+    fn corrected(&self, word: String, wrong: fn(usize) -> usize) -> String {
         let typed = || SYNONYMS.iter().flat_map(|&(typed, _)| typed.split(' '));
         if typed().any(|known| known == word) {
             return word;
@@ -69,7 +75,7 @@ impl Profile {
         }
         let called = self.entries().flat_map(|entry| names(entry).chain([entry.label()]));
         let known: Vec<String> = called.flat_map(words).chain(typed().map(str::to_owned)).collect();
-        near(&word, known.iter().map(String::as_str)).map_or_else(|| word.clone(), str::to_owned)
+        within(&word, known.iter().map(String::as_str), wrong).map_or_else(|| word.clone(), str::to_owned)
     }
 }
 

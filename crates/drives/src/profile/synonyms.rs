@@ -37,6 +37,9 @@ pub(crate) const SYNONYMS: &[(&str, &[&str])] = &[
     ("minimum", &["lower"]),
     ("limit", &["ceiling"]),
     // What is measured.
+    ("motor current", &["output current"]),
+    ("motor speed", &["rotation speed", "output frequency"]),
+    ("motor voltage", &["output voltage"]),
     ("amp", &["current"]),
     ("ampere", &["current"]),
     ("current limit", &["torque limit", "torque ceiling"]),

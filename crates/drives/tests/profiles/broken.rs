@@ -62,6 +62,7 @@ fn every_mistake_names_file_line_and_reason() {
         ),
         ("profile.toml", "bit = 15", "bit = 16", "8 to 15"),
         ("profile.toml", "format = \"8E1\"", "format = \"8X1\"", "8X1"),
+        ("profile.toml", "format = \"8E1\"", "format = \"7N2\"", "Modbus RTU has 8 data bits"),
         ("profile.toml", "unit = 1", "unit = 248", "1 to 247"),
         ("profile.toml", "baud_rate = 19200", "baud_rate = 0", "50 to 10000000"),
         // What it says of the tables.

@@ -27,16 +27,28 @@ fn registers_codes_and_addresses_are_found() {
 fn what_is_not_found_is_explained() {
     let profile = Profile::builtin("gd350").unwrap();
     let closest = |name: &str| match profile.find(name) {
-        Err(NameError::Unknown { closest, .. }) => closest,
+        Err(NameError::Unknown { closest, .. }) => closest.join(", "),
         other => panic!("{name}: {other:?}"),
     };
     assert_eq!(closest("output_curent"), "output_current");
     assert_eq!(closest("setfrequency"), "set_frequency");
     assert_eq!(closest("P00.13"), "P00.03", "the first of those one character away");
+    assert_eq!(
+        closest("frequency"),
+        "set_frequency, fwd_upper_frequency, rev_upper_frequency, running_frequency, set_frequency_actual",
+        "all that it may be a part of"
+    );
+    assert!(closest("curent").contains("output_current"), "{}", closest("curent"));
     for nothing_near in ["", "zzz", "nonsense"] {
         assert_eq!(closest(nothing_near), "", "{nothing_near:?}");
     }
     assert_eq!(profile.find("zzz").unwrap_err().to_string(), "gd350 has no \"zzz\"");
+    for (number, said) in [
+        ("40001", "; 40001 is register 0000H: name it 0x0000"),
+        ("412289", "; 412289 is register 3000H: name it 0x3000"),
+    ] {
+        assert_eq!(profile.find(number).unwrap_err().to_string(), format!("gd350 has no \"{number}\"{said}"));
+    }
     assert_eq!(
         profile.find("output_curent").unwrap_err().to_string(),
         "gd350 has no \"output_curent\"; the closest is \"output_current\""

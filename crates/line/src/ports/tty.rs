@@ -312,7 +312,7 @@ fn configure(port: &mut SerialPort, format: &SerialFormat, parity: Parity, data_
 fn open_error(path: &str, error: &io::Error) -> PortError {
     let kind = system::open_error_kind(error);
     let message = match kind {
-        PortErrorKind::NotFound => format!("there is no such port ({error}); {}", present_ports()),
+        PortErrorKind::NotFound => format!("there is no such port; {}", present_ports()),
         PortErrorKind::Busy => holder::advice(Path::new(path)),
         PortErrorKind::Denied => format!(
             "this user may not open it ({error}); join the group that owns it, usually `sudo usermod -aG dialout \
@@ -371,6 +371,7 @@ mod tests {
             assert_eq!(error.kind, kind, "{errno}");
             assert!(error.to_string().starts_with("/dev/ttyX: "), "{error}");
             assert!(error.to_string().contains(advice), "{error}");
+            assert!(!error.to_string().contains("os error"), "{error}");
         }
     }
 

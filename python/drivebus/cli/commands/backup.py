@@ -12,10 +12,12 @@ import drivebus
 from drivebus.backup.unread import in_words
 from drivebus.cli.names import complete_group
 from drivebus.cli.option_types import Place
+from drivebus.cli.parallel import each_drive
 from drivebus.cli.present.backups import BackupTaken, Differences, RestoreReport
 from drivebus.cli.present.output import counted, remark
 from drivebus.cli.present.progress import progress_bar
 from drivebus.cli.session import Session, pass_session, yes_option
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["COMMANDS", "progress_bar"]
 
@@ -23,20 +25,24 @@ _FACTORY = "factory"
 """Stands for what the factory set, where a file could."""
 
 _file = Place(dir_okay=False, path_type=Path)
+_file_or_folder = Place(path_type=Path)
 
 
 @click.command()
-@click.argument("file", type=_file)
+@click.argument("file", type=_file_or_folder)
 @click.option("--fresh", is_flag=True, help="Start again instead of continuing an interrupted backup.")
 @click.option("--force", is_flag=True, help="Replace FILE, whether it is an older backup or something else.")
-@pass_session
+@each_drive
 def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
     """Read every parameter the profile knows into FILE, a text for people and version control.
 
     Writes nothing to the drive. After an interruption, the same command continues where it stopped. Passwords are not
     read. Exit code 1: some were lost, or refused for another reason than that they are not there, or closed; then what
-    was read is in FILE.part, and the same command asks for the rest.
+    was read is in FILE.part, and the same command asks for the rest. Of several drives, FILE is a folder, which gets a
+    file for each: FILE/pump1.toml.
     """
+    if session.crew is not None:
+        file = _in_folder(file, session.called)
     if not force:
         _keep_older(file)
     with session.drive() as drive, progress_bar(session.out, "reading") as progress:
@@ -47,6 +53,19 @@ def backup(session: Session, file: Path, fresh: bool, force: bool) -> None:
         lost = [why for why in kept.unread.values() if why.open]
         remark(f"The backup is not complete: {in_words(lost)}, see above. The same command asks for the rest.")
         raise click.exceptions.Exit(1)
+
+
+def _in_folder(folder: Path, drive: str) -> Path:
+    """The file of *drive* in *folder*, which is made where it is not there."""
+    if folder.suffix:
+        raise WrongUse(f"several drives have a file each: give a folder for them, such as {folder.stem}")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise drivebus.BadArgument(
+            f"{folder} cannot be a folder for several backups: {error.strerror or error}; nothing was read"
+        ) from None
+    return folder / f"{drive.replace(' ', '-')}.toml"
 
 
 def _keep_older(file: Path) -> None:
@@ -177,9 +196,9 @@ def _diff(
 ) -> tuple[drivebus.Diff, drivebus.Profile]:
     """What differs, and the profile that says how its values are shown."""
     if a == b == _FACTORY:
-        raise click.UsageError(f"{_FACTORY} does not differ from itself: give a FILE, or nothing for the drive, as B")
+        raise WrongUse(f"{_FACTORY} does not differ from itself: give a FILE, or nothing for the drive, as B")
     if b == _FACTORY:
-        raise click.UsageError(f"{_FACTORY} comes first: drivebus diff {_FACTORY} {a}")
+        raise WrongUse(f"{_FACTORY} comes first: drivebus diff {_FACTORY} {a}")
     first = None if a == _FACTORY else _load(session, Path(a))
     if b is None:
         with session.drive() as drive:

@@ -14,6 +14,7 @@ from drivebus.cli.option_types import Seconds, Whole
 from drivebus.cli.present.findings import Finding
 from drivebus.cli.present.output import counted, show
 from drivebus.cli.session import EXAMPLE_PORT, Session, parse_format, pass_session
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["COMMANDS"]
 
@@ -55,7 +56,7 @@ def doctor(
     """
     port = port or session.port
     if port is None:
-        raise click.UsageError(f"no port: give it, as in `drivebus doctor {EXAMPLE_PORT}`; `drivebus ports` lists them")
+        raise WrongUse(f"no port: give it, as in `drivebus doctor {EXAMPLE_PORT}`; `drivebus ports` lists them")
     if unit is None and context.find_root().get_parameter_source("unit") is not ParameterSource.DEFAULT:
         unit = session.unit
     bits, parity, stop = line_format or session.line_format

@@ -11,15 +11,17 @@ from drivebus.cli.present.descriptions import Description, Group, Groups, Matche
 from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.fault_lists import FaultHistory, FaultsByFamily, KnownFaults
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["COMMANDS"]
 
 
 @click.command()
 @click.argument("text", metavar="TEXT...", nargs=-1, required=True, shell_complete=names.complete_name)
+@click.option("--all", "everything", is_flag=True, help="Also what programmers need: table, words, scale, sign.")
 @pass_session
-def describe(session: Session, text: tuple[str, ...]) -> None:
-    """Show all that is known about a register or parameter, or search for one.
+def describe(session: Session, text: tuple[str, ...], everything: bool) -> None:
+    """Show what is known about a register or parameter, or search for one.
 
     TEXT is a name, a code or an address. Anything else is searched for in names, labels, choices and notes:
     `drivebus describe torque`. Other words of the field are found too, such as "ramp" or "dc link". With --profile, no
@@ -40,7 +42,7 @@ def describe(session: Session, text: tuple[str, ...]) -> None:
             raise
         session.out.render(Matches(profile, wanted, [profile.describe(name) for name in found]))
         return
-    session.out.render(Description(known))
+    session.out.render(Description(known, everything))
 
 
 @click.command(name="list")
@@ -115,7 +117,7 @@ def faults(session: Session, text: tuple[str, ...], everything: bool) -> None:
     drive is asked for faults then.
     """
     if everything and text:
-        raise click.UsageError("--all lists every fault: leave it out to have one explained")
+        raise WrongUse("--all lists every fault: leave it out to have one explained")
     if everything or text:
         _show_known(session, " ".join(text))
         return

@@ -65,10 +65,10 @@ def hal(
     no_watchdog: bool,
     hal_path: str | None,
 ) -> None:
-    """Be a component of LinuxCNC's HAL: the drive as a spindle. For `loadusr -W drivebus hal …`.
+    """Run as a LinuxCNC HAL component, with the drive as a spindle. For `loadusr -W drivebus hal …`.
 
-    Runs until HAL unloads it. Moves the motor as the pins say, and stops it when it ends. docs/linuxcnc.md has the
-    pins. Not a safety function: an emergency stop is a wire.
+    Runs until HAL unloads it. The pins move the motor, and the end of the component stops it. docs/linuxcnc.md lists
+    the pins. Not a safety function: an emergency stop is a wire.
     """
     session.will_write()
     linuxcnc = module(hal_path)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import click
@@ -19,6 +21,7 @@ from drivebus.cli.present.errors import exit_code, tell
 from drivebus.cli.present.found_units import FoundUnit
 from drivebus.cli.present.output import counted, remark
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.line.scan_order import PROTOCOLS, asked
 
 __all__ = ["COMMANDS"]
@@ -37,8 +40,18 @@ def ports(session: Session) -> None:
     )
 
 
+_EVERYBODY = "1-247"
+"""The addresses that a scan asks, if nobody says which."""
+
+
 @click.command()
-@click.option("--units", default="1-247", show_default=True, metavar="LIST", help="Addresses to ask, such as 1-31,40.")
+@click.option(
+    "--units",
+    default=_EVERYBODY,
+    show_default=True,
+    metavar="LIST",
+    help="Addresses to ask, such as 1-31,40; --unit and -u mean the same here.",
+)
 @click.option("--timeout", type=Seconds(0.001, 3600), help="Seconds to wait for each answer.  [default: 0.1]")
 @click.option(
     "--search",
@@ -69,15 +82,16 @@ def scan(
     With --search, nothing needs to be known of the line: baud rate, format and address are found. Only reads are sent.
     The port must be free, because its settings change.
     """
+    session, units = _units_to_ask(context, session, units)
     if search:
-        if context.get_parameter_source("units") is not ParameterSource.DEFAULT:
-            raise click.UsageError("--search decides itself which addresses it asks: leave --units out, or --search")
+        if units != _EVERYBODY:
+            raise WrongUse("--search decides itself which addresses it asks: leave --units out, or --search")
         if context.get_parameter_source("protocol") is not ParameterSource.DEFAULT:
-            raise click.UsageError("--search decides itself how it asks: leave --protocol out, or --search")
+            raise WrongUse("--search decides itself how it asks: leave --protocol out, or --search")
         scan_search.search(session, timeout, full)
         return
     if full:
-        raise click.UsageError("--full is for --search: give that too")
+        raise WrongUse("--full is for --search: give that too")
     session.one_port()
     wanted = names.parse_units(units, session.addresses)
     # On the console that the lines go to, so that they stand above the bar.
@@ -101,10 +115,20 @@ def scan(
         session.out.say(f"{units_found}, {len(wanted) - count} silent, {took:.0f} s")
     else:
         remark(
-            "Error: no unit answered. Check wiring (A/B), baud rate and format (factory setting of a Goodrive: "
-            f"19200 8E1, unit 1). Or let `{session.doctor()}` look."
+            "Error: no unit answered. Check power and wiring (swap A and B), or find baud rate, format and address: "
+            f"`{session.for_line('scan --search')}`. `{session.doctor()}` looks at adapter and line."
         )
         raise click.exceptions.Exit(3)
+
+
+def _units_to_ask(context: click.Context, session: Session, units: str) -> tuple[Session, str]:
+    """The session for the line alone, and which units are asked: those of `-u`, where that was typed, too."""
+    root = context.find_root()
+    if root.params.get("drives") or root.get_parameter_source("units") is not ParameterSource.COMMANDLINE:
+        return session, units
+    if context.get_parameter_source("units") is not ParameterSource.DEFAULT:
+        raise WrongUse("--unit and --units both say which addresses are asked: leave one of them out")
+    return replace(session, several=()), str(root.params["units"])
 
 
 @click.command()
@@ -126,8 +150,8 @@ def info(session: Session) -> None:
     session.out.render(known)
     if against is not None:
         remark(f"{against[0].upper()}{against[1:]}. Until then nothing is written to it.")
-    elif found.candidates and known.profile.family not in found.candidates:
-        remark(f"It is treated as {known.profile.family}, and does not say that it is one.")
+    elif found.candidates and known.profile.family not in found.candidates and known.profile.identifications():
+        remark(f"Using profile {known.profile.name}; the drive does not report its family.")
 
 
 def _round_trip(bus: drivebus.Bus, unit: int) -> float | None:
@@ -148,10 +172,9 @@ def status(session: Session) -> None:
     with session.drive() as drive:
         now = drive.status()
         measured = _measured(drive)
-    unproved = "state" in now.missing and drive.profile.state_reason() is not None and not drive.unverified
-    hint = "`--unverified` also shows what no document of this family proves." if unproved else ""
-    described = {name: drive.describe(name) for name in measured}
-    session.out.render(DriveStatus(now, measured, described, hint))
+        assumed, besides = _assumed(drive, now, measured)
+    described = {name: drive.describe(name) for name in (*measured, *besides)}
+    session.out.render(DriveStatus(now, measured, described, assumed, besides))
 
 
 _MEASURED = ("output_current", "output_voltage", "bus_voltage", "rotation_speed")
@@ -162,6 +185,25 @@ def _measured(drive: drivebus.Drive) -> dict[str, Any]:
     """What the drive measures at its motor, in one more read at most."""
     known = [name for name in _MEASURED if name in drive.profile.names() and _may_be_read(drive, name)]
     return {str(name): value for name, value in drive.snapshot(*known).items()} if known else {}
+
+
+def _assumed(
+    drive: drivebus.Drive, now: drivebus.Status, measured: Mapping[str, Any]
+) -> tuple[drivebus.Status | None, dict[str, Any]]:
+    """What registers tell besides that are only assumed: to read them harms nobody, and they are shown as such.
+
+    Nothing of that where it tells no more, or the drive does not answer it.
+    """
+    roles = [role for role in ("state", "fault", "frequency", "setpoint") if role in now.missing]
+    if drive.unverified or not any(drive.profile.role(role) for role in roles):
+        return None, {}
+    names = [name for name in _MEASURED if name in drive.profile.names() and name not in measured]
+    try:
+        status = drive.status(unverified=True)
+        besides = drive.snapshot(*names, unverified=True) if names else {}
+    except drivebus.DrivebusError:
+        return None, {}
+    return (status if len(status.missing) < len(now.missing) else None), dict(besides)
 
 
 def _may_be_read(drive: drivebus.Drive, name: str) -> bool:

@@ -18,8 +18,13 @@ from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.motors import OBEYING, on_the_way
 from drivebus.cli.present.output import remark
 from drivebus.cli.session import Session, force_option, pass_session, within_option, yes_option
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["COMMANDS"]
+
+
+_IN_RAM = "Kept in RAM until the drive is switched off; --store keeps it in EEPROM."
+_IN_EEPROM = "Kept in EEPROM: the drive has it after it was switched off, too."
 
 
 class _Run(click.Command):
@@ -28,7 +33,7 @@ class _Run(click.Command):
     def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
         for before, word in zip(["", *args], args, strict=False):
             if before != "--wait" and re.fullmatch(r"-\d+(\.\d*)?", word):
-                raise click.UsageError(
+                raise WrongUse(
                     f"A speed cannot be {word} Hz; `drivebus run {word[1:]} --reverse` turns the other way", context
                 )
         return super().parse_args(context, args)
@@ -160,7 +165,7 @@ def prepare(session: Session, store: bool, yes: bool) -> None:
             _say_kept([item.code for item in before if item.ok])
         session.out.rows(["code", "is", "needed", "verified", "label"], rows)
         if not store:
-            session.out.say("It is kept in RAM, until the drive is switched off; --store keeps it in EEPROM.")
+            session.out.say(_IN_RAM)
 
 
 @click.command()
@@ -221,6 +226,8 @@ def write(session: Session, assignments: tuple[str, ...], store: bool, force: bo
         ]
         _say_kept(kept)
         session.out.render(Written(rows))
+        if any(drive.describe(name).kind == "parameter" for name in wanted) and not kept:
+            session.out.say(_IN_EEPROM if store else _IN_RAM)
 
 
 def _read_back(drive: drivebus.Drive, written: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import click
 from drivebus.cli.option_types import Place, Seconds, Whole
 from drivebus.cli.present.recordings import Drawn
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.plot import draw, of_recording
 from drivebus.plot.draw import check
 from drivebus.record import read
@@ -45,7 +46,7 @@ def plot(
     picture_file = Path(files[0]).with_suffix(".png") if target is None else Path(target)
     check(picture_file)
     if picture_file.exists() and not force:
-        raise click.UsageError(f"{picture_file} is there already; give another name by -o, or --force")
+        raise WrongUse(f"{picture_file} is there already; give another name by -o, or --force")
     recording = read(*files)
     picture = of_recording(recording, Path(files[0]).name, names, begin=begin, end=end, points=points)
     draw(picture, picture_file)

@@ -15,6 +15,7 @@ from drivebus.cli.present.families import KINDS, Families, FamilyRules, Mistakes
 from drivebus.cli.present.help_format import Listing
 from drivebus.cli.present.output import remark
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["COMMANDS"]
 
@@ -79,7 +80,7 @@ def _warn(profile: drivebus.Profile) -> None:
 def new(session: Session, folder: Path, like: str | None, overlay: str | None) -> None:
     """Start a profile: write its files, with comments that explain them. Nothing is overwritten."""
     if like is not None and overlay is not None:
-        raise click.UsageError("give --like or --overlay, not both: a profile is either a copy or an overlay")
+        raise WrongUse("give --like or --overlay, not both: a profile is either a copy or an overlay")
     base = like or overlay
     if base is not None:
         drivebus.Profile.builtin(base)
@@ -87,13 +88,13 @@ def new(session: Session, folder: Path, like: str | None, overlay: str | None) -
         written = profile_template.files(folder.resolve().name, like=like, overlay=overlay)
         there = [name for name in written if (folder / name).exists() or (folder / name).is_symlink()]
         if there:
-            raise click.UsageError(f"{folder} has {', '.join(there)} already; nothing was written")
+            raise WrongUse(f"{folder} has {', '.join(there)} already; nothing was written")
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in written.items():
             with (folder / name).open("x", encoding="utf-8", newline="\n") as file:
                 file.write(text)
     except OSError as error:
-        raise click.UsageError(f"{error.filename or folder}: {error.strerror or error}") from error
+        raise WrongUse(f"{error.filename or folder}: {error.strerror or error}") from error
     session.out.record({"folder": str(folder), "files": list(written)})
     session.out.say(f"{folder}: {', '.join(written)}")
     session.out.say(f"Fill them in, then: drivebus profiles check {folder}")

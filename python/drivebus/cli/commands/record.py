@@ -19,6 +19,7 @@ from drivebus.cli.present.output import counted, printable, remark
 from drivebus.cli.present.recordings import Recorded
 from drivebus.cli.session import Session, pass_session
 from drivebus.cli.signals import heeded
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.end_signals import END_SIGNALS
 from drivebus.record.formats import format_of
 
@@ -69,7 +70,7 @@ def record(
     out = session.out
     format_of(target)
     if Path(target).exists() and not force:
-        raise click.UsageError(f"{target} is there already; give another name, or --force")
+        raise WrongUse(f"{target} is there already; give another name, or --force")
     with ExitStack() as opened:
         lines = opened_lines(session, opened)
         drives = {drive: one for _, several in lines for one, drive in several}

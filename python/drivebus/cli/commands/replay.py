@@ -74,9 +74,9 @@ def _asked(request: bytes) -> str:
 def replay(session: Session, file: str, transport: str, duration: float | None) -> None:
     """Answer as the units in a capture did, until Ctrl-C.
 
-    FILE is a pcapng or pcap file, or hex text. Each request gets the answers that it got there, in their order; the
-    last of them is given from then on. What nobody answered there stays without an answer. A read that is not there is
-    answered if all its registers were read there; a write only if it is there. What cannot be answered is told.
+    FILE is a pcapng or pcap file, or hex text. Each request gets the answers that it got in the capture, in their
+    order, and then the last one again. A new read is answered if the capture has all its registers, a new write never.
+    Requests without an answer in the capture stay unanswered and are reported.
     """
     line = line_of(file) or session.serial_format
     exchanges = list(exchanges_in(read(file, remark), line))

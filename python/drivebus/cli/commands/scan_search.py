@@ -43,6 +43,8 @@ def search(session: Session, timeout: float | None, full: bool) -> None:
                     found.take(located)
                     if bar is not None:
                         bar.found += 1
+                        # On the console of the bar, so that it stands above it.
+                        out.say(found.in_a_line(located))
         finally:
             # Also what was found before Ctrl-C, or before the port was lost.
             found.end()

@@ -22,6 +22,7 @@ from drivebus.cli.present.output import counted, remark
 from drivebus.cli.present.sniff_table import SniffTable
 from drivebus.cli.session import EXAMPLE_PORT, Session, pass_session
 from drivebus.cli.signals import heeded
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.end_signals import END_SIGNALS
 from drivebus.sniffer import Exchange, Families, Figures
 
@@ -71,7 +72,7 @@ def sniff(
     """
     port = port or session.port
     if port is None:
-        raise click.UsageError(f"no port: give it, as in `drivebus sniff {EXAMPLE_PORT}`; `drivebus ports` lists them")
+        raise WrongUse(f"no port: give it, as in `drivebus sniff {EXAMPLE_PORT}`; `drivebus ports` lists them")
     families = Families(parse_families(session.profile))
     units = _units(context, session)
     shown = Filter(units, frozenset(_function(text) for text in functions), errors)
@@ -149,7 +150,7 @@ def _function(text: str) -> int:
     except ValueError:
         function = 0
     if not 1 <= function <= 0x7F:
-        raise click.UsageError(f'"{text}" is not a function; give one in hexadecimal, 01 to 7F')
+        raise WrongUse(f'"{text}" is not a function; give one in hexadecimal, 01 to 7F')
     return function
 
 

@@ -13,6 +13,7 @@ from drivebus.cli.drive_selection import find_site, of_drive
 from drivebus.cli.parallel import Crew
 from drivebus.cli.present.output import remark
 from drivebus.cli.session import Session, is_another
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.site import families_on, forget
 
 __all__ = ["stop_all"]
@@ -37,7 +38,7 @@ def stop_all(context: click.Context, session: Session, within: float, done: _Don
     root = context.find_root()
     for parameter, option in (("units", "--unit"), ("drives", "--drive")):
         if root.get_parameter_source(parameter) is ParameterSource.COMMANDLINE:
-            raise click.UsageError(f"--all stops every drive that is known: leave {option} out, or --all", context)
+            raise WrongUse(f"--all stops every drive that is known: leave {option} out, or --all", context)
     session = replace(session, several=()) if session.several else session
     lines = _lines(context, session)
     if len(lines) == 1:

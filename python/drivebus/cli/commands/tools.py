@@ -7,6 +7,7 @@ from click.shell_completion import get_completion_class
 
 from drivebus.cli import demonstration as demonstration
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["COMMANDS"]
 
@@ -24,7 +25,7 @@ def completion(context: click.Context, shell: str) -> None:
     """  # noqa: D301 - click needs the control character
     kind = get_completion_class(shell)
     if kind is None:
-        raise click.UsageError(f"no completion for {shell}")
+        raise WrongUse(f"no completion for {shell}")
     click.echo(kind(context.find_root().command, {}, "drivebus", "_DRIVEBUS_COMPLETE").source())
 
 

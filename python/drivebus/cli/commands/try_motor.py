@@ -23,6 +23,7 @@ from drivebus.cli.present.output import Output, remark
 from drivebus.cli.present.trials import TrialResult
 from drivebus.cli.required_options import NamesAllMissing
 from drivebus.cli.session import Session, force_option, pass_session, yes_option
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.trial import Trial
 from drivebus.trial.abort_rules import Bounds
 from drivebus.trial.setpoint_courses import Change, Wave
@@ -212,7 +213,7 @@ def _check(picture: str) -> None:
 
     check(picture)
     if Path(picture).exists():
-        raise click.UsageError(f"{picture} is there already; give another name. The motor was not started")
+        raise WrongUse(f"{picture} is there already; give another name. The motor was not started")
 
 
 class _Kept:
@@ -268,10 +269,10 @@ def _new(file: str) -> TextIO:
     try:
         return Path(file).open("x", encoding="utf-8", newline="")
     except FileExistsError:
-        raise click.UsageError(f"{file} is there already; give another name. The motor was not started") from None
+        raise WrongUse(f"{file} is there already; give another name. The motor was not started") from None
     except OSError as error:
         reason = error.strerror or error
-        raise click.UsageError(f"{file} cannot be written: {reason}. The motor was not started") from None
+        raise WrongUse(f"{file} cannot be written: {reason}. The motor was not started") from None
 
 
 def _now(session: Session, drive: drivebus.Drive, turning: str) -> Iterator[str]:

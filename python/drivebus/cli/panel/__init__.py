@@ -17,6 +17,7 @@ from drivebus.cli.option_types import Seconds
 from drivebus.cli.present.errors import exit_code
 from drivebus.cli.present.output import remark
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["COMMANDS"]
 
@@ -45,7 +46,7 @@ def panel(context: click.Context, session: Session, watchdog: float | None) -> N
     try:
         import textual  # noqa: F401 - whether it is there
     except ImportError:
-        raise click.UsageError(
+        raise WrongUse(
             "the panel needs textual: pip install 'drivebus[panel]'; `drivebus monitor` is the plain table"
         ) from None
     for one in session.several or (session,):
@@ -81,10 +82,10 @@ def _each_its_family(session: Session) -> Session:
         return session
     members = session.several or (session,)
     if any(one.name for one in members):
-        raise click.UsageError("drivebus.toml has the family of each drive: `profile` there, or one --profile for all")
+        raise WrongUse("drivebus.toml has the family of each drive: `profile` there, or one --profile for all")
     others = families.keys() - {one.unit for one in members}
     if others:
-        raise click.UsageError(f"--profile names unit {min(others)}, and --unit does not")
+        raise WrongUse(f"--profile names unit {min(others)}, and --unit does not")
     for name in families.values():
         drivebus.Profile.find(name)
     each = tuple(
@@ -98,7 +99,7 @@ def _check_terminal(session: Session, traces: bool) -> None:
     """Refuses a terminal that cannot show it, before anything is opened."""
     plain = f"`{session.command('monitor')}` is the plain table"
     if session.out.as_json or traces:
-        raise click.UsageError(
+        raise WrongUse(
             f"the panel has the whole screen, so --{'json' if session.out.as_json else 'trace'} is for others; {plain}"
         )
     if not all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr)):

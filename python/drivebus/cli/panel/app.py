@@ -62,6 +62,9 @@ class Panel(App[None]):
     #lamps, #fault, #line { height: auto; }
     #fault { max-height: 5; }
     #line { max-height: 3; }
+    .tight #tiles { margin-top: 0; margin-bottom: 0; }
+    .tight #foot { height: 3; }
+    .tight #messages { height: 2; }
     #chosen { height: auto; max-height: 7; margin-top: 1; }
     Overview { height: 1fr; scrollbar-size-vertical: 0; }
     ModalScreen { align: center bottom; background: transparent; }
@@ -271,9 +274,23 @@ class Panel(App[None]):
         self._beat()
 
     def on_overview_chosen(self, event: Overview.Chosen) -> None:
-        """Looks at one drive."""
-        self.current = event.member
-        self.push_screen(self._view(event.member))
+        """Looks at one drive, or asks whether it is of the one family that it may be of."""
+        self.current = member = event.member
+        family = member.likely
+        if not family:
+            self.push_screen(self._view(member))
+            return
+        text = (
+            f"{member.called} does not say what it is, and answers like a {family}. Registers and commands differ "
+            f"between families. Use it as a {family}?"
+        )
+
+        def go_on(key: str | None) -> None:
+            if key == "y":
+                member.take_as(family)
+            self.push_screen(self._view(member))
+
+        self.push_screen(Ask(text, {"y": f"yes, it is a {family}"}), go_on)
 
     def action_messages(self) -> None:
         """Shows all messages."""
@@ -294,12 +311,14 @@ class Panel(App[None]):
 
     def action_quit_asking(self) -> None:
         """Ends the panel; asks first where that stops a motor."""
-        started = [member.called for member in self.members if member.motor.started]
-        if not started:
-            self.exit()
-            return
-        text = f"The panel started {', '.join(started)}. Its end stops what it started. Leave it?"
-        self.push_screen(Ask(text, {"y": "stop and leave"}), lambda key: self.action_leave() if key else None)
+        started = [member for member in self.members if member.motor.started]
+        # One that stands is stopped as well when the panel ends; that needs no question.
+        turning = [member.called for member in started if not render.rests(member)]
+        if turning:
+            question = Ask(f"Stop {' and '.join(turning)}, and quit?", {"y": "stop and quit"})
+            self.push_screen(question, lambda key: self.action_leave() if key else None)
+        else:
+            self.action_leave()
 
     # --- what is asked -----------------------------------------------------------------------------------------
 
@@ -368,7 +387,7 @@ class Panel(App[None]):
 
     def _unknown(self, member: Member) -> None:
         why = f": {member.why}" if member.why else " yet"
-        self.journal.say(f"{member.called}: what drive it is, is not known{why}. Space stops it all the same", "yellow")
+        self.journal.say(f"{member.called}: what drive it is, is not known{why}. Space stops it anyway", "yellow")
 
     # --- what ends it ------------------------------------------------------------------------------------------
 

@@ -35,7 +35,7 @@ A motor that was started elsewhere goes on when the panel ends.
 
 ? behind a value: not verified. ! behind a value: assumed. `drivebus describe NAME` says why.
 
-Behind a trend stand the least and the greatest value that it shows.
+The numbers behind a trend are its lowest and its highest value.
 
 An emergency stop is a wire."""
 

@@ -59,6 +59,8 @@ class Member:
         self.session = session
         self.line = line
         self.motor = PanelMotor(session.called, self._halt, self._tell, journal, watchdog)
+        self._journal = journal
+        self._fault: int | None = None
         self.drive: drivebus.Drive | None = None
         self.watched: Watched | None = None
         self.highest: float | None = None
@@ -102,6 +104,16 @@ class Member:
             return ""
         family = self.may_be[0] if len(self.may_be) == 1 else "NAME"
         return f'profile = "{family}"' if self.session.name else f"--profile {self.session.unit}={family}"
+
+    @property
+    def likely(self) -> str:
+        """The one family that it may be of, where it does not say itself what it is; empty where there are several."""
+        return self.may_be[0] if self.naming and len(self.may_be) == 1 else ""
+
+    def take_as(self, family: str) -> None:
+        """Takes it as of *family* from the next look on."""
+        self.session = replace(self.session, profile=family)
+        self._journal.say(f"{self.called}: taken as a {family} until this panel ends; {self.naming} names it")
 
     @property
     def is_silent(self) -> bool:
@@ -167,6 +179,7 @@ class Member:
         self._taken = sample
         self.watched.take(sample)
         if sample.missing is None:
+            self._see_whether_it_trips(sample)
             self._see_whether_it_slows(sample)
             self.told = {}
             for word in self._words:
@@ -182,6 +195,17 @@ class Member:
         if watched is None or watched.now is None or watched.state is None or watched.state not in watched.now:
             return None
         return drivebus.State(watched.profile.state(int(watched.now[watched.state])))
+
+    def _see_whether_it_trips(self, sample: drivebus.Sample) -> None:
+        """Says in the journal that it tripped, or was in fault when it was seen first."""
+        assert self.watched is not None
+        if self.watched.fault is None or self.watched.fault not in sample:
+            return
+        profile, before = self.watched.profile, self._fault
+        self._fault = profile.fault_number(int(sample[self.watched.fault]))
+        if self._fault and self._fault != before:
+            happened = "is in fault" if before is None else "tripped"
+            self._journal.say(f"{self.called} {happened}: {profile.fault(self._fault)}", "bold red")
 
     def _see_whether_it_slows(self, sample: drivebus.Sample) -> None:
         """One that stands is not on its way to a stop any more, nor is one that somebody else has started again."""

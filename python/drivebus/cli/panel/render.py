@@ -27,6 +27,7 @@ __all__ = [
     "marks",
     "named",
     "plain_value",
+    "rests",
     "scaled",
     "state",
     "tiles",
@@ -82,7 +83,7 @@ def state(member: Member) -> Text:
         return _state(member)
     why = f": {member.why}" if member.why else ""
     if member.naming:
-        why = f"; name it: {member.naming}"
+        why = f"; Enter: use it as {member.likely}" if member.likely else f"; name it: {member.naming}"
     return Text(printable(f"{_nothing(member)}{why}"), "yellow")
 
 
@@ -93,19 +94,24 @@ def _state(member: Member) -> Text:
     if member.motor.is_slowing and state is not None and (doing := going(state, drivebus.State.STOPPED)):
         return Text(doing, "yellow")
     told = member.watched.doing()
-    return told if told.plain else Text("state not told", "dim")
+    return told if told.plain else Text("state not told; --unverified may show it", "dim")
 
 
 def _nothing(member: Member) -> str:
     """Why there is nothing to show, in two words."""
     if member.is_silent:
-        return "no answer"
+        return "no port" if isinstance(member.problem, drivebus.PortError) else "no answer"
     return "not known" if member.why else "waiting"
 
 
 def turns(member: Member) -> bool:
     """Whether its motor turns, as far as it tells."""
     return member.state is not None and member.state.running
+
+
+def rests(member: Member) -> bool:
+    """Whether its motor surely stands, by a value that is fresh."""
+    return member.state is not None and not member.why and member.state.at_rest
 
 
 def tripped(member: Member) -> bool:
@@ -168,14 +174,14 @@ def limits(member: Member, name: str) -> str:
     return row.unit if highest is None else f"{row.unit}, up to {row.text(highest)}"
 
 
-def big(member: Member, name: str, width: int) -> RenderableType:
-    """One value in big figures, with its name, its unit, its limits and its trend, in six lines."""
+def big(member: Member, name: str, width: int, height: int = 1) -> RenderableType:
+    """One value in big figures, with its name, its unit, its limits and its trend, whose lines are *height*."""
     shown = plain_value(member, name)
     return Group(
         Text(_fitting(named(name) + _mark(member, name), width), "bold"),
         Digits(shown, "bold") if shown else Text("\n\n"),
         Text(_fitting(limits(member, name), width), "dim"),
-        scaled(member, name, width),
+        scaled(member, name, width, height),
     )
 
 
@@ -186,7 +192,7 @@ def _fitting(text: str, width: int) -> str:
     return text[:width]
 
 
-def trend(member: Member, name: str, width: int) -> Text:
+def trend(member: Member, name: str, width: int, height: int = 1) -> Text:
     """The latest values of *name*, the newest to the right: from 0 to the limit, or from the least to the greatest."""
     seen: Sequence[float] = list(member.trends.get(name, ()))[-width:]
     if not seen:
@@ -198,12 +204,17 @@ def trend(member: Member, name: str, width: int) -> Text:
     # What is wider than what was seen is so to both sides, and does not begin below 0 for that.
     bottom = (low + high - span) / 2
     bottom = max(bottom, 0.0) if low >= 0 else bottom
-    steps = len(_LEVELS) - 1
-    return Text("".join(_LEVELS[round((each - bottom) / span * steps)] for each in seen), "cyan")
+    full = len(_LEVELS)
+    steps = [round((each - bottom) / span * (height * full - 1)) for each in seen]
+    lines = [
+        "".join(" " if step < below else _LEVELS[min(step - below, full - 1)] for step in steps)
+        for below in range((height - 1) * full, -1, -full)
+    ]
+    return Text("\n".join(lines), "cyan")
 
 
-def scaled(member: Member, name: str, width: int) -> Text:
-    """The trend of *name*, and behind it the least and the greatest value that it shows."""
+def scaled(member: Member, name: str, width: int, height: int = 1) -> Text:
+    """The trend of *name*, and behind its last line the least and the greatest value that it shows."""
     seen = list(member.trends.get(name, ()))
     if not seen or member.watched is None:
         return Text("")
@@ -217,7 +228,10 @@ def scaled(member: Member, name: str, width: int) -> Text:
     room = next((room for room in range(width, 0, -1) if room + 1 + len(ends(room)) <= width), 0)
     if room < 1:
         return Text(ends(width), "dim")
-    return _filled(trend(member, name, room), room).append(f" {ends(room)}", "dim")
+    drawn = trend(member, name, room, height)
+    # Behind the last of its lines, which all have a letter for each value.
+    drawn.pad_right(max(room - len(seen), 0))
+    return drawn.append(f" {ends(room)}", "dim")
 
 
 def values(member: Member, shown_big: Sequence[str], width: int, height: int, page: int) -> Text:

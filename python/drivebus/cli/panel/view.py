@@ -27,9 +27,17 @@ _FAULT, _PREPARE = "x reset", "b prepare"
 _TILE = 19
 """Columns of a big value: six figures and a point."""
 _MOST_TILES = 6
+_TILE_HEIGHT = 6
+"""Lines of a big value with a trend of one line."""
+_LARGE, _TALLEST = 34, 12
+"""Lines of a window in which all values have room, and lines more that a trend takes at most."""
 _MESSAGES = 3
 """Lines of messages."""
 _MORE = " … m: all"
+_ROOMY = 30
+"""Lines of a window in which a fault, with its cause and remedy, leaves the values their room."""
+_TIGHT = "tight"
+"""The class of a screen that has less."""
 
 
 class Piece(Static):
@@ -89,10 +97,11 @@ class View(Screen[None]):
         """The newest message in full, as far as there is room, and those before it."""
         width = max(self.size.width, 1)
         shown: list[Text] = []
-        for line in reversed(self._journal.lines()[-_MESSAGES:]):
+        most = _MESSAGES - self.has_class(_TIGHT)
+        for line in reversed(self._journal.lines()[-most:]):
             text = Text(f"{line.when:%H:%M:%S} ", "dim").append(line.text, line.style)
             lines = list(text.wrap(self.app.console, width))
-            room = _MESSAGES - len(shown)
+            room = most - len(shown)
             if len(lines) > room and shown:
                 break
             if len(lines) > room:
@@ -211,21 +220,27 @@ class DriveView(View):
         self.query_one("#lamps", Piece).put(Text("\n").join(render.lamps(member)))
         fault = self.query_one("#fault", Piece)
         told = render.fault(member)
+        self.set_class(bool(told) and self.size.height < _ROOMY, _TIGHT)
         fault.display = bool(told)
         fault.put(told)
         self.query_one("#line", Piece).put(render.line(member))
         super().show()
 
     def _show_tiles(self, names: Sequence[str]) -> None:
+        # What a large window has left over, trends take.
+        tall = min(max(self.size.height - _LARGE, 0), _TALLEST) + 1
+        tiles = self.query_one("#tiles", Horizontal)
+        tiles.styles.height = _TILE_HEIGHT + tall - 1
         for place in range(_MOST_TILES):
             tile = self.query_one(f"#tile{place}", Piece)
+            tile.styles.height = _TILE_HEIGHT + tall - 1
             tile.display = place < len(names)
             if place >= len(names):
                 continue
             name, width = names[place], max(tile.size.width - 1, 1)
-            drawn = render.scaled(self.member, name, width).plain
+            drawn = render.scaled(self.member, name, width, tall).plain
             key = (name, render.value(self.member, name), drawn, self.member.highest)
-            tile.put(render.big(self.member, name, width), key)
+            tile.put(render.big(self.member, name, width, tall), key)
 
 
 def _keys(is_tripped: bool) -> Text:

@@ -15,6 +15,22 @@ __all__ = ["Description", "Group", "Groups", "Matches"]
 _MATCHES = 20
 """Most rows that a search shows: who has more of them asks for something narrower."""
 
+_WRITABLE = {
+    "run": "any time",
+    "rw": "any time",
+    "stop": "only while the motor is stopped",
+    "ro": "no",
+    "wo": "any time; it cannot be read",
+    "unknown": "yes; not known whether also while the motor runs",
+}
+"""When a value can be written, by its access."""
+
+_FOR_PROGRAMS = ("kind", "table", "words", "scale", "signed", "high_first", "access", "listed")
+"""What people rarely ask for."""
+
+_CHOICES = 3
+"""Most choices that a row of a list shows; `describe` has them all."""
+
 
 def _address(row: drivebus.Description) -> str | None:
     return None if row.place is None else tables.shown(row.place)
@@ -22,28 +38,47 @@ def _address(row: drivebus.Description) -> str | None:
 
 @dataclass(frozen=True)
 class Description:
-    """All that is known of one register or parameter."""
+    """All that is known of one register or parameter.
+
+    Attributes:
+        known: That.
+        everything: Whether people see what only programs need, too.
+    """
 
     known: drivebus.Description
+    everything: bool = False
 
     def records(self) -> Iterator[dict[str, Any]]:
         """All of it, by name."""
         yield {**vars(self.known), "address": _address(self.known)}
 
     def lay_out(self, out: Output) -> None:
-        """The same, and where its range is not printed, that."""
+        """The same in words, and where its range is not printed, that."""
         known = self.known
+        writable = _WRITABLE[known.access]
+        if known.writable and known.verified and not known.bounded:
+            printed = ", but for its choices," if known.choices else ""
+            writable += f"; its range is not printed, so a write{printed} needs --unverified"
         values = {
-            **vars(known),
+            "name": known.name,
+            "code": known.code,
+            "label": known.label,
             "address": _address(known),
+            "unit": known.unit,
+            "range": "" if known.choices else _range(known),
+            "limited by": " and ".join(code for code in (known.low_from, known.high_from) if code),
+            "default": None if known.default is None else known.text(known.default),
+            "writable": writable,
             "choices": ", ".join(f"{number} = {label}" for number, label in known.choices.items()),
             "bits": ", ".join(known.bits or {}),
-            "unverified_bits": ", ".join(known.unverified_bits),
+            "unverified bits": ", ".join(known.unverified_bits),
+            "depends on": known.variant,
+            "note": known.note,
+            "evidence": known.evidence,
+            "source": known.source,
         }
-        del values["verified"]  # `evidence` says more
-        if known.writable and known.verified and not known.bounded:
-            printed = " but for its choices" if known.choices else ""
-            values["write"] = f"unverified{printed}: its range is not printed"
+        if self.everything:
+            values |= {name: value for name, value in vars(known).items() if name in _FOR_PROGRAMS}
         out.facts(values)
 
 
@@ -79,7 +114,7 @@ class Matches:
         if all(word in best for word in self.wanted.lower().split()):
             count = f"{len(self.found)} {matches}"
         else:
-            count = f"nothing that is called so, and {len(self.found)} near {matches}"
+            count = f"nothing called that, but {len(self.found)} near {matches}"
         narrower = f", the best {_MATCHES} of them; more words narrow it" if len(self.found) > _MATCHES else ""
         out.say(f'{self.profile.name} has {count} for "{self.wanted}"{narrower}:')
         rows = self._rows()
@@ -120,14 +155,19 @@ class Group:
         """The same in a table."""
         out.say(f"{self.title}: {counted(len(self.rows), 'row')}")
         rows = [list(row.values()) for row in self._columns()]
-        out.rows(["name", "code", "address", "unit", "range", "access", "label"], rows)
+        # A code says which it is as well as a name does; what has none is known by its name alone.
+        coded = all(row.code is not None for row in self.rows)
+        spare = ("address", "name", "access") if coded else ("code", "access", "address")
+        out.rows(["name", "code", "address", "unit", "range", "access", "label"], rows, spare)
         if self.unlisted:
             out.say(self.unlisted)
 
 
 def _range(row: drivebus.Description) -> str:
     if row.choices:
-        return f"{len(row.choices)} choices"
+        shown = [f"{number} = {label}" for number, label in row.choices.items()]
+        more = f", … ({len(shown)} choices)" if len(shown) > _CHOICES else ""
+        return ", ".join(shown[:_CHOICES]) + more
     if row.low is None or row.high is None:
         return ""
     return f"{row.text(row.low)} to {row.text(row.high)}"

@@ -11,6 +11,7 @@ from drivebus.cli.present import profile_rules
 from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.errors import exit_code
 from drivebus.cli.present.output import Output
+from drivebus.cli.present.screen import MARKS
 
 __all__ = ["DriveStatus", "Identity", "KnownDrive", "Reading", "Readings", "Written"]
 
@@ -120,6 +121,9 @@ class KnownDrive:
                 out.say(f"{item.code}{'' if item.verified else ' is not verified'}: {item.note}")
 
 
+_ASSUMED = MARKS["assumed"]
+
+
 @dataclass(frozen=True)
 class DriveStatus:
     """What a drive is doing.
@@ -128,13 +132,15 @@ class DriveStatus:
         status: What it tells.
         measured: What it measures at its motor, by name.
         described: What is known of those names.
-        hint: What else would show more, for people.
+        assumed: The same as *status* by registers that are only assumed, too; None where that tells no more.
+        assumed_measured: What such registers measure, by name.
     """
 
     status: drivebus.Status
     measured: Mapping[str, Any] = field(default_factory=dict)
     described: Mapping[str, drivebus.Description] = field(default_factory=dict)
-    hint: str = ""
+    assumed: drivebus.Status | None = None
+    assumed_measured: Mapping[str, Any] = field(default_factory=dict)
 
     def facts(self) -> dict[str, Any]:
         """What it tells, by name, and what it does not, and why."""
@@ -151,27 +157,57 @@ class DriveStatus:
         }
 
     def records(self) -> Iterator[dict[str, Any]]:
-        """What it tells, and what it measures."""
-        yield {**self.facts(), **self.measured}
+        """What it tells, and what it measures; apart from that, what is only assumed."""
+        told = {**self.facts(), **self.measured}
+        if self.assumed is not None:
+            seen = DriveStatus(self.assumed).facts()
+            told["assumed"] = {
+                **{name: value for name, value in seen.items() if self._is_assumed(name)},
+                **self.assumed_measured,
+            }
+        yield told
 
     def lay_out(self, out: Output) -> None:
-        """The same with units; what is missing, with the reason, behind it."""
-        values = self.facts()
+        """The same with units, and what is assumed with a mark; then what is missing, and why.
+
+        In one line where there are several drives.
+        """
+        shown = self.status if self.assumed is None else self.assumed
+        measured = {**self.measured, **self.assumed_measured}
+        if out.drive:
+            mark = "" if self.assumed is None else f" {_ASSUMED}"
+            out.say(f"{out.drive}: {', '.join([str(shown), *map(self._measured, measured)])}{mark}")
+            return
+        values = DriveStatus(shown).facts()
         missing = values.pop("missing")
         if "state" in missing:
             values["state"] = None
         for name in ("frequency", "setpoint"):
             if values[name] is not None:
                 values[name] = f"{values[name]:.2f} Hz"
-        rows = self.described
-        out.facts(
-            {**values, **{name: f"{rows[name].text(value)} {rows[name].unit}" for name, value in self.measured.items()}}
-        )
+        for name, value in values.items():
+            if value is not None and self._is_assumed(name):
+                values[name] = f"{('no', 'yes')[value] if isinstance(value, bool) else value} {_ASSUMED}"
+        out.facts({**values, **{name: self._measured(name) for name in measured}})
+        if self.assumed is not None:
+            out.say(f"{_ASSUMED} assumed: no document of this family proves it; --unverified uses it for commands too.")
         if missing:
+            by_reason: dict[str, list[str]] = {}
+            for name, reason in missing.items():
+                by_reason.setdefault(reason, []).append(name.replace("_", " "))
             out.say("Missing:")
-            out.facts(missing)
-            if self.hint:
-                out.say(self.hint)
+            out.facts({", ".join(names): reason for reason, names in by_reason.items()})
+
+    def _is_assumed(self, name: str) -> bool:
+        """Whether what is shown as *name* is only assumed."""
+        role = {"commands_from": "source"}.get(name, name)
+        return self.assumed is not None and role in self.status.missing and role not in self.assumed.missing
+
+    def _measured(self, name: str) -> str:
+        """A measured value with its unit, and a mark if it is only assumed."""
+        known = self.described[name]
+        value = self.measured.get(name, self.assumed_measured.get(name))
+        return f"{known.text(value)} {known.unit}{f' {_ASSUMED}' if name in self.assumed_measured else ''}"
 
 
 @dataclass

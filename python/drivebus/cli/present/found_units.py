@@ -79,6 +79,12 @@ class LocatedUnits:
             }
         )
 
+    @staticmethod
+    def in_a_line(located: drivebus.Located) -> str:
+        """One of them, for who watches the search."""
+        problem = f" ({located.problem})" if located.problem else ""
+        return f"unit {located.unit} at {located.settings}: {_family(located)}{problem}"
+
     def end(self) -> None:
         """Those that came in a table, what its words mean, and what to type next."""
         if not self._found or self._out.as_json:

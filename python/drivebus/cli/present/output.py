@@ -61,6 +61,11 @@ class Output:
         self._held: io.StringIO | None = None
         self._drive = ""
 
+    @property
+    def drive(self) -> str:
+        """Whose results these are, where there are several drives; empty for one alone."""
+        return self._drive
+
     def held(self, drive: str) -> Output:
         """One for *drive* that keeps what it is given until it may `let_go`: several are filled at once."""
         other = Output(self.as_json)
@@ -156,13 +161,21 @@ class Output:
                 table.add_row(show(name.replace("_", " ")), show(value))
         self._lay_out(table)
 
-    def rows(self, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-        """Several things of one kind: a JSON object each, or a table."""
+    def rows(self, columns: Sequence[str], rows: Iterable[Sequence[Any]], spare: Sequence[str] = ()) -> None:
+        """Several things of one kind: a JSON object each, or a table.
+
+        Args:
+            columns: Their names.
+            rows: A value for each column.
+            spare: Columns that a narrow terminal goes without, the first to go first.
+        """
         if self.as_json:
             for row in rows:
                 self.record(dict(zip(columns, row, strict=True)))
             return
         kept = list(rows)
+        if spare and self.console.is_terminal:
+            columns, kept = _fitting(columns, kept, spare, self.console.width)
         table = self.table(columns, kept)
         # A name that is cut cannot be typed, and a word broken in the middle not be read.
         room = self.console.width - _BETWEEN * (len(columns) - 1)
@@ -200,6 +213,22 @@ class Output:
         for row in kept:
             table.add_row(*(show(cell) for cell in row))
         return table
+
+
+def _fitting(
+    columns: Sequence[str], rows: Sequence[Sequence[Any]], spare: Sequence[str], width: int
+) -> tuple[Sequence[str], list[Sequence[Any]]]:
+    """*columns* and *rows* without as many of the *spare* columns as it takes for each row to have one line."""
+    names, kept = list(columns), [list(row) for row in rows]
+    for name in spare:
+        room = width - _BETWEEN * (len(names) - 1)
+        if sum(_widths([[title, *(row[at] for row in kept)] for at, title in enumerate(names)], sys.maxsize)) <= room:
+            break
+        at = names.index(name)
+        del names[at]
+        for row in kept:
+            del row[at]
+    return names, list(kept)
 
 
 def _widths(columns: Sequence[Sequence[Any]], room: int) -> list[int]:

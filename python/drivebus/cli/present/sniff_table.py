@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 
 from rich.console import Console, ConsoleOptions, RenderResult
 from rich.table import Table
@@ -19,6 +20,8 @@ from drivebus.sniffer.statistics import RegisterFigures, UnitFigures
 
 __all__ = ["SniffTable"]
 
+_WIDEST = 30
+"""Letters of what the bits of a word mean."""
 _LAST = 5
 """What went wrong last is shown for so many exchanges."""
 
@@ -92,7 +95,7 @@ class SniffTable:
         for address, unit in sorted(self._figures.units.items()):
             profile = self._families.of(address) if address else None
             mark = "?" if profile is not None and self._families.is_guess(address) else ""
-            for name, register in unit.registers.items():
+            for name, register in _by_name(unit, profile).items():
                 shown, *rest = _register(name, register, profile)
                 yield [str(address), f"{shown}{mark}" if isinstance(name, str) else shown, *rest]
 
@@ -105,6 +108,34 @@ class SniffTable:
         return table
 
 
+def _by_name(unit: UnitFigures, profile: drivebus.Profile | None) -> dict[str | int, RegisterFigures]:
+    """The registers of *unit*, those heard before its family was known under the names that they have now."""
+    if profile is None:
+        return unit.registers
+    found: dict[str | int, RegisterFigures] = {}
+    for heard, register in unit.registers.items():
+        name, known = heard, register
+        if isinstance(heard, int) and register.value is not None:
+            place = profile.plain_address(heard) if heard <= 0xFFFF else heard
+            named = profile.name_at(place, written=bool(register.writes))
+            if named is not None and profile.describe(named).words == 1:
+                name, known = named, replace(register, value=profile.decode(named, int(register.value)))
+        other = found.get(name)
+        found[name] = known if other is None else _joined(other, known)
+    return found
+
+
+def _joined(one: RegisterFigures, other: RegisterFigures) -> RegisterFigures:
+    """What was heard of a register under two names."""
+    return replace(
+        max(one, other, key=lambda each: each.last),
+        reads=one.reads + other.reads,
+        writes=one.writes + other.writes,
+        changes=one.changes + other.changes,
+        first=min(one.first, other.first),
+    )
+
+
 def _register(name: str | int, register: RegisterFigures, profile: drivebus.Profile | None) -> list[str]:
     """A register as one row: what it is called, its value, its unit, how often it was read and written."""
     value, unit = str(register.value), ""
@@ -112,6 +143,9 @@ def _register(name: str | int, register: RegisterFigures, profile: drivebus.Prof
     if profile is not None and isinstance(name, str) and register.value is not None:
         row = profile.describe(name)
         value, unit = row.text(register.value), row.unit
+        if row.bits:
+            meant = ", ".join(profile.fields(name, int(register.value)).values())
+            unit = meant if len(meant) <= _WIDEST else f"{meant[: _WIDEST - 1]}…"
         shown = f"{row.code} {row.name}" if row.code not in (None, row.name) else row.name
     period = register.period
     every = "" if period is None else f"{period:.2f} s" if period >= 1 else f"{period * 1e3:.0f} ms"

@@ -17,6 +17,7 @@ from drivebus.cli.raw.request import request_of
 from drivebus.cli.raw.script import Send, Step, Typed, requests_of, typed_in
 from drivebus.cli.raw.sending import Sender
 from drivebus.cli.session import Session, pass_session, yes_option
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["raw"]
 
@@ -56,9 +57,9 @@ def raw(
     commands there). --force sends any other.
     """
     if data and script is not None:
-        raise click.UsageError("give HEX or --script, not both")
+        raise WrongUse("give HEX or --script, not both")
     if interval is not None and count is None:
-        raise click.UsageError("--interval is the time from one of --count times to the next; give --count too")
+        raise WrongUse("--interval is the time from one of --count times to the next; give --count too")
     if data:
         request = request_of(data, force, session.addresses)
         if not request.only_looks:
@@ -68,9 +69,7 @@ def raw(
         return
     if script is None and sys.stdin is not None and sys.stdin.isatty():
         if count is not None or keep_going:
-            raise click.UsageError(
-                "--count and --keep-going are for HEX and scripts; the prompt takes x10 behind a line"
-            )
+            raise WrongUse("--count and --keep-going are for HEX and scripts; the prompt takes x10 behind a line")
         from drivebus.cli.raw.prompt import prompt
 
         with session.bus(read_only=session.read_only) as bus:
@@ -79,7 +78,7 @@ def raw(
     name = "standard input" if script in (None, "-") else str(script)
     typed = list(typed_in(_lines(script), name, session.unit, force, session.addresses))
     if not any(line.verb in ("hex", "read", "write") for line in typed):
-        raise click.UsageError(f"{name} has no request; nothing was sent")
+        raise WrongUse(f"{name} has no request; nothing was sent")
     with session.bus(read_only=session.read_only) as bus:
         _send(
             session,
@@ -100,15 +99,15 @@ def _lines(script: str | None) -> list[str]:
         click.UsageError: It cannot be read, or is no text.
     """
     if script in (None, "-") and sys.stdin is None:
-        raise click.UsageError("there is no standard input; give HEX, or a file with --script")
+        raise WrongUse("there is no standard input; give HEX, or a file with --script")
     try:
         with click.open_file("-" if script is None else script, encoding="utf-8-sig") as file:
             text: str = file.read()
             return text.splitlines()
     except UnicodeDecodeError:
-        raise click.UsageError(f"{script or 'standard input'} is not text; nothing was sent") from None
+        raise WrongUse(f"{script or 'standard input'} is not text; nothing was sent") from None
     except OSError as error:
-        raise click.UsageError(f"{script} cannot be read: {error.strerror or error}") from None
+        raise WrongUse(f"{script} cannot be read: {error.strerror or error}") from None
 
 
 def _steps(session: Session, typed: Sequence[Typed], families: UnitFamilies) -> list[Step]:

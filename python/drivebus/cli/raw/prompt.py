@@ -21,9 +21,9 @@ read output_current     the same by name, code or address; several names are ask
 write P00.11=2.5        a parameter goes to RAM; what writes asks first
 … x10                   ten times, as fast as the line allows
 … x10 every 0.5         ten times, one each half second; Ctrl-C ends it
-unit 2                  whose names are meant from now on; this number is decimal
+unit 2                  sets the unit whose names are used; this number is decimal
 wait 0.5                waits half a second
-# …                     is not looked at
+# …                     a comment
 help, ?                 this
 quit, Ctrl-D            ends"""
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import click
-
 import drivebus
 from drivebus import tables
 from drivebus.cli import names
 from drivebus.cli.present.error_wording import in_commands
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.line.addresses import Addresses
 from drivebus.line.trace import meaning
 from drivebus.rtu import framed
@@ -65,19 +64,19 @@ def request_of(parts: tuple[str, ...], force: bool, addresses: Addresses) -> Req
     """
     body = names.parse_hex(parts)
     if not 2 <= len(body) <= 254:
-        raise click.UsageError(
+        raise WrongUse(
             f"{len(body)} {'byte is' if len(body) == 1 else 'bytes are'} not a request; give the unit, then 1 to 253 "
             "bytes of PDU, and no CRC"
         )
     why = addresses.why_not(body[0])
     if why:
-        raise click.UsageError(
+        raise WrongUse(
             f"no unit {body[0]:02X} answers; the first byte is the unit, 01 to F7. Unit {body[0]}: {in_commands(why)}"
         )
     addresses.unit(body[0], changes=not drivebus.rtu.only_reads(body[1:]))
     if not force and len(body) > 4 and framed(body[:-2]) == body:
         asked = body[:-2].hex(" ").upper()
-        raise click.UsageError(f"the last two bytes are the CRC of the others, and it is added; give {asked}")
+        raise WrongUse(f"the last two bytes are the CRC of the others, and it is added; give {asked}")
     return Request(body[0], body[1:])
 
 
@@ -97,5 +96,5 @@ def check_commands(request: Request) -> None:
             raise drivebus.BadArgument(
                 f"{word} at {tables.shown(address)} is not a command of any family that has its command register there "
                 f"({', '.join(family.name for family in there)}); nothing was sent to unit {request.unit}. With "
-                "--profile the family is known; with --force it is sent all the same"
+                "--profile the family is known; --force sends it anyway"
             )

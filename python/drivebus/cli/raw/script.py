@@ -18,6 +18,7 @@ from drivebus.advice import Text
 from drivebus.cli import names
 from drivebus.cli.option_types import with_a_point
 from drivebus.cli.raw.request import Request, request_of
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.line.addresses import EVERYBODY, Addresses
 
 __all__ = ["VERBS", "Send", "Step", "Typed", "Wait", "located", "requests_of", "typed_in"]
@@ -82,7 +83,7 @@ def located(where: str) -> Iterator[None]:
     try:
         yield
     except click.UsageError as error:
-        raise click.UsageError(f"{where}: {error.message}" if where else error.message) from None
+        raise WrongUse(f"{where}: {error.message}" if where else error.message) from None
     except drivebus.NotAllowed as error:
         if not where:
             raise
@@ -120,12 +121,12 @@ def _typed(words: tuple[str, ...], where: str, unit: int, force: bool, addresses
     if verb == "unit":
         units = names.parse_units(_only(words, "unit 2"), addresses)
         if len(units) > 1:
-            raise click.UsageError(f'"{words[1]}" is several units; a request goes to one')
+            raise WrongUse(f'"{words[1]}" is several units; a request goes to one')
         return Typed(where, verb, (), units[0])
     words, times, every = _repeated(words)
     if verb in ("read", "write"):
         if not words[1:]:
-            raise click.UsageError(
+            raise WrongUse(
                 "read what? Give a name, such as read output_current"
                 if verb == "read"
                 else "write what? Give a name and a value, such as write P00.11=2.5"
@@ -134,7 +135,7 @@ def _typed(words: tuple[str, ...], where: str, unit: int, force: bool, addresses
             names.parse_assignment(word)
         return Typed(where, verb, words[1:], unit, times, every)
     if not words or not re.fullmatch(r"(0x|[0-9a-f:,])+", words[0], re.IGNORECASE):
-        raise click.UsageError(
+        raise WrongUse(
             f'"{(words or ("x",))[0]}" begins no line; give unit and PDU in hex, such as 01 03 2100 0001, or '
             f"{', '.join(VERBS[:-1])} or {VERBS[-1]}"
         )
@@ -145,7 +146,7 @@ def _typed(words: tuple[str, ...], where: str, unit: int, force: bool, addresses
 def _only(words: tuple[str, ...], example: str) -> str:
     """The one word behind the verb."""
     if len(words) != 2:
-        raise click.UsageError(f"{words[0]} takes one number; write {example}")
+        raise WrongUse(f"{words[0]} takes one number; write {example}")
     return words[1]
 
 
@@ -153,9 +154,9 @@ def _seconds(text: str, what: str) -> float:
     try:
         seconds = float(text)
     except ValueError:
-        raise click.UsageError(f'{what} "{text}" is not a number of seconds{with_a_point(text)}') from None
+        raise WrongUse(f'{what} "{text}" is not a number of seconds{with_a_point(text)}') from None
     if not 0 <= seconds <= _LONGEST_WAIT:
-        raise click.UsageError(f"{what} {text} is out of range; allowed is 0 to {_LONGEST_WAIT:g} seconds")
+        raise WrongUse(f"{what} {text} is out of range; allowed is 0 to {_LONGEST_WAIT:g} seconds")
     return seconds
 
 
@@ -165,14 +166,14 @@ def _repeated(words: tuple[str, ...]) -> tuple[tuple[str, ...], int, float | Non
     if "every" in words:
         at = words.index("every")
         if len(words) != at + 2 or not re.fullmatch(r"x\d+", words[at - 1], re.IGNORECASE):
-            raise click.UsageError("every stands behind a number of times; write x10 every 0.5")
+            raise WrongUse("every stands behind a number of times; write x10 every 0.5")
         every, words = _seconds(words[-1], "every"), words[:at]
     match = re.fullmatch(r"x(\d+)", words[-1], re.IGNORECASE)
     if match is None:
         return words, 1, None
     digits = match[1].lstrip("0")
     if not digits or len(digits) > len(str(_MOST_TIMES)) or int(digits) > _MOST_TIMES:
-        raise click.UsageError(f"{words[-1]} is out of range; allowed is x1 to x{_MOST_TIMES}")
+        raise WrongUse(f"{words[-1]} is out of range; allowed is x1 to x{_MOST_TIMES}")
     return words[:-1], int(digits), every
 
 
@@ -222,7 +223,7 @@ def _write(unit: int, text: str, profile: drivebus.Profile, unverified: bool) ->
     place = names.resolve(profile, name, written=True)
     if isinstance(place, int):
         if not isinstance(value, int) or not 0 <= value <= 0xFFFF:
-            raise click.UsageError(f'"{value}" is not a word from 0 to 65535, which is what an address takes')
+            raise WrongUse(f'"{value}" is not a word from 0 to 65535, which is what an address takes')
         address, word = place, value
     else:
         known = profile.describe(place)
@@ -239,6 +240,6 @@ def _check_proved(row: drivebus.Description, enough: tuple[str, ...], doing: str
     if row.evidence not in enough and not unverified:
         reason = (row.reason or "no document of this family says so").rstrip(".")
         raise drivebus.Unverified(
-            f"{doing} {row.code or row.name} ({row.label}) is not verified: {reason}. With --unverified it is done "
-            "nevertheless, and so it is in hex"
+            f"{doing} {row.code or row.name} ({row.label}) is not verified: {reason}. Use --unverified, or hex, to "
+            "do it anyway"
         )

@@ -18,6 +18,10 @@ from drivebus.rtu import framed
 __all__ = ["Sender"]
 
 
+_HARMLESS = ("s", "ms", "min", "h", "kHz", "V", "A", "kW")
+"""Units of parameters that move no motor that stands."""
+
+
 class Sender:
     """Sends what lines ask for, and shows it.
 
@@ -60,14 +64,25 @@ class Sender:
                         self._families.check(request, self._force)
                         if request.writes:
                             writes[request] += step.times * count
+        moves = ", which can move the motor" if any(map(self._could_move, writes)) else ""
         if len(writes) == 1:
             [(request, times)] = writes.items()
-            self._session.ask(
-                f"This sends {self._told(request, times)}, which can move the motor", self._yes, request.unit
-            )
+            self._session.ask(f"This sends {self._told(request, times)}{moves}", self._yes, request.unit)
         elif writes:
             rows = [f"  unit {request.unit}: {self._told(request, times)}" for request, times in writes.items()]
-            ask_once([f"On {self._session.port} this sends, which can move the motor:", *rows], self._yes)
+            ask_once([f"On {self._session.port} this sends{moves}:", *rows], self._yes)
+
+    def _could_move(self, request: Request) -> bool:
+        """Whether *request* may move the motor, for all that is known: parameters that cannot are the exception.
+
+        A speed or a share may be the setpoint of a motor that turns, and what has choices may decide who starts it.
+        """
+        write, profile = drivebus.rtu.written(request.pdu), self._families.known(request.unit)
+        if write is None or profile is None:
+            return True
+        names = [profile.name_at(profile.plain_address(write[0] + place)) for place in range(len(write[1]))]
+        rows = [None if name is None else profile.describe(name) for name in names]
+        return not all(row and row.kind == "parameter" and row.unit in _HARMLESS and not row.choices for row in rows)
 
     def _told(self, request: Request, times: int) -> str:
         means = request.meaning(self._families.known(request.unit))

@@ -16,6 +16,7 @@ from drivebus.cli.present.output import Output
 from drivebus.cli.session import Session, parse_format, pass_session
 from drivebus.cli.sim.control_socket import Order, ask, running
 from drivebus.cli.sim.rates import rates_of
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["ctl"]
 
@@ -50,13 +51,13 @@ def _meant(which: str | None) -> Path:
     """
     found = running()
     if not found:
-        raise click.UsageError("no simulation of yours takes orders; start one in another window: `drivebus sim`")
+        raise WrongUse("no simulation of yours takes orders; start one in another window: `drivebus sim`")
     meant = {path: told for path, told in found.items() if which is None or _is_called(told, which)}
     ports = ", ".join(str(told.get("port")) for told in found.values())
     if not meant:
-        raise click.UsageError(f'no simulation is called "{which}"; there are {ports}')
+        raise WrongUse(f'no simulation is called "{which}"; there are {ports}')
     if len(meant) > 1:
-        raise click.UsageError(f"{len(meant)} simulations run; choose one with --of: {ports}")
+        raise WrongUse(f"{len(meant)} simulations run; choose one with --of: {ports}")
     return next(iter(meant))
 
 
@@ -195,6 +196,6 @@ def settings(context: click.Context, session: Session, settings: tuple[str, ...]
             bits, parity, stop = parse_format(context, context.command.params[0], word)
             found = {"bytesize": int(bits), "parity": parity, "stopbits": int(stop)}
         if found.keys() & wanted.keys():
-            raise click.UsageError(f"{' '.join(settings)}: one speed and one format, such as 9600 8N1")
+            raise WrongUse(f"{' '.join(settings)}: one speed and one format, such as 9600 8N1")
         wanted |= found
     _send(session, order="settings", **wanted)

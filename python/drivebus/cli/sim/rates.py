@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import click
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["rates_of"]
 
@@ -12,7 +12,7 @@ def rates_of(every: float | None, single: tuple[str, ...]) -> dict[str, float]:
     rates = {} if every is None else {"all": every}
     for kind, rate in map(_rate, single):
         if kind in rates:
-            raise click.UsageError(f"the rate of {kind} is given twice")
+            raise WrongUse(f"the rate of {kind} is given twice")
         rates[kind] = rate
     return rates
 
@@ -22,4 +22,4 @@ def _rate(text: str) -> tuple[str, float]:
     try:
         return kind.strip().replace("-", "_"), float(rate)
     except ValueError:
-        raise click.UsageError(f'"{text}" is not a fault; write KIND=RATE, such as late=0.02') from None
+        raise WrongUse(f'"{text}" is not a fault; write KIND=RATE, such as late=0.02') from None

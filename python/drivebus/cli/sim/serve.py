@@ -7,10 +7,12 @@ import shlex
 import signal
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 import drivebus
 from drivebus.cli.names import complete_units
@@ -21,6 +23,7 @@ from drivebus.cli.session import Session, pass_session
 from drivebus.cli.sim.control_commands import Orders, in_words
 from drivebus.cli.sim.control_socket import open_to_orders
 from drivebus.cli.sim.rates import rates_of
+from drivebus.cli.wrong_use import WrongUse
 from drivebus.end_signals import END_SIGNALS
 from drivebus.latch import Latch
 
@@ -38,7 +41,19 @@ class Ear(Place):
         return value if value == UNLINKED else super().convert(value, parameter, context)
 
 
-@click.group(cls=Listing, invoke_without_command=True)
+class _Sim(Listing):
+    """Takes a family for drives as well: `drivebus sim gd350`."""
+
+    def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
+        """Takes a single word that is no command, but a family or a folder, for unit 1."""
+        if args and not args[0].startswith("-") and args[0] not in self.commands:
+            word, *rest = args
+            if "=" in word or word in drivebus.profiles() or Path(word).is_dir():
+                args = ["--units", word if "=" in word else f"1={word}", *rest]
+        return super().parse_args(context, args)
+
+
+@click.group(cls=_Sim, invoke_without_command=True)
 @click.option(
     "--units",
     default="1=gd350",
@@ -93,18 +108,20 @@ def sim(
     ear: str | None,
     fifo: int,
 ) -> None:
-    """Serve simulated drives until Ctrl-C or SIGTERM, for this program or any other.
+    """Serve simulated drives until Ctrl-C or SIGTERM, for this program or any other: `drivebus sim gd350`.
 
     The line has the settings of the global options --baud and --format: `drivebus sim --units 1=vfd500 --baud 9600
-    --format 8N1`.
+    --format 8N1`. Without them, a profile of your own says how its drive leaves the factory.
 
     While it serves them, `drivebus sim ctl` in another window trips, loads and unplugs them.
     """
     if context.invoked_subcommand is not None:
         return
+    drives = _simulated(units)
+    session = _on_their_line(context, session, drives)
     bits, parity, stop = session.line_format
     simulator = drivebus.Simulator(
-        _simulated(units),
+        drives,
         baudrate=session.baud,
         bytesize=int(bits),
         parity=parity,
@@ -218,13 +235,27 @@ class _Served:
         out.say("Ctrl-C ends it.")
 
 
+def _on_their_line(context: click.Context, session: Session, drives: dict[int, str]) -> Session:
+    """*session* with the line that profiles of one's own give, where they agree and none was typed."""
+    root = context.find_root()
+    typed = any(root.get_parameter_source(name) is not ParameterSource.DEFAULT for name in ("baud", "line_format"))
+    if typed or any(family in drivebus.profiles() for family in drives.values()):
+        return session
+    known = [drivebus.Profile.find(family).serial() for family in drives.values()]
+    lines = {(each.baud_rate, each.format) for each in known if each is not None}
+    if len(lines) != 1 or None in known:
+        return session
+    [(baud, characters)] = lines
+    return replace(session, baud=baud, line_format=(characters[0], characters[1], characters[2]))
+
+
 def _simulated(text: str) -> dict[int, str]:
     units: dict[int, str] = {}
     for part in text.split(","):
         unit, equals, family = part.strip().partition("=")
         if not equals or re.fullmatch(r"\d{1,20}", unit) is None:
-            raise click.UsageError(f'"{part}" is not a simulated drive; write UNIT=FAMILY, such as 1=gd350')
+            raise WrongUse(f'"{part}" is not a simulated drive; write UNIT=FAMILY, such as 1=gd350')
         if int(unit) in units:
-            raise click.UsageError(f"unit {unit} is given twice; give each unit once, such as 1=gd350,2=gd350")
+            raise WrongUse(f"unit {unit} is given twice; give each unit once, such as 1=gd350,2=gd350")
         units[int(unit)] = family
     return units
