@@ -52,7 +52,9 @@ def count(command: list[str], settings: dict[str, str]) -> dict[str, int]:
     cargo = os.environ.get("CARGO", "cargo")
     # The wheel's crate is named for its features: what the wheel was built of is not built once more.
     packages = ["-p", "drivebus-python", "-p", "drivebus-benches"]
-    subprocess.run([cargo, "build", "--locked", "--quiet", "--release", *packages, "--bin", "counts"], cwd=ROOT, check=True)
+    subprocess.run(
+        [cargo, "build", "--locked", "--quiet", "--release", *packages, "--bin", "counts"], cwd=ROOT, check=True
+    )
     found: dict[str, int] = {}
     with tempfile.TemporaryDirectory() as folder:
         run = subprocess.run(
