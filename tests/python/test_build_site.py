@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 from tools import build_site, count_words
-from tools.absolute_links import project
-from tools.build_site import BELOW, CONTENTS, DOCS, REFERENCE, ROOT, foreign_files, placed, rewritten
+from tools.absolute_links import ROOT, project
+from tools.build_site import BELOW, CONTENTS, DOCS, REFERENCE, foreign_files, placed, rewritten
 from tools.family_pages import ABOUT
 
 import drivebus
