@@ -119,7 +119,9 @@ def audit(target: Target, wheel: Path) -> list[str]:
         strange = {name for name in strange if not name.startswith("api-ms-win-")}
         return wrong + [f"it needs {name}, which not every Windows has" for name in sorted(strange)]
     # `auditwheel repair` takes wheels of its own processor only; `show` says of every one what it is for.
-    show = subprocess.run([str(BIN / "auditwheel"), "show", str(wheel)], env=environ, capture_output=True, text=True)
+    # It is given no folder to look for libraries in: what this system has is not what the wheel will find.
+    command = [str(BIN / "auditwheel"), "show", "--ldpaths", "", str(wheel)]
+    show = subprocess.run(command, env=environ, capture_output=True, text=True)
     if show.returncode or f'platform tag:\n"{target.tag}"' not in show.stdout:
         wrong.append(f"auditwheel: {show.stdout}{show.stderr}")
     return wrong
