@@ -79,7 +79,8 @@ def _in_short(profile: drivebus.Profile) -> list[tuple[str, str]]:
     serial, memory = profile.serial(), profile.memory()
     line = "not known"
     if serial is not None:
-        line = f"{serial.baud_rate} bit/s, {serial.format}, unit {serial.unit}"
+        line = f"{serial.baud_rate} bit/s, {serial.format}"
+        line += "" if serial.unit is None else f", unit {serial.unit}"
         line += "" if serial.verified else " (unverified)"
     needs = [f"{each.code} = {each.value}" + ("" if each.verified else " (unverified)") for each in profile.control()]
     proved = {each for each in profile.commands() if profile.command_reason(each) is None}

@@ -210,7 +210,8 @@ class _Program(click.Group):
     "--read-only",
     is_flag=True,
     envvar="DRIVEBUS_READ_ONLY",
-    help="Only read: refuse everything that would write to a drive, also a stop, before anything is sent.",
+    help="Only read: refuse whatever would write to a drive, even a stop. "
+    "A drive whose program was killed is stopped anyway.",
 )
 @click.option(
     "--variant",

@@ -233,11 +233,11 @@ class Halt:
         """Why nothing was taken, in words."""
         unit, error, took = self.unit, self._failure, self.unit.bus.now() - self._began
         may = commands.MAY[self.command]
+        told = " or ".join(map(commands.said, dict.fromkeys(self._rota[: self._frames])))
         times = f"{self._frames} times within {took:.1f} s" if self._frames != 1 else "once"
         if isinstance(error, Refused):
             return Refused(
-                f"{commands.said(self.command)} was sent to unit {unit.address} {times} and not taken, at last: "
-                f"{error}; {may}. "
+                f"{told} was sent to unit {unit.address} {times} and not taken, at last: {error}; {may}. "
                 f"{await commands.state_afterwards(unit, urgent=True)}",
                 code=error.code,
                 name=error.name,
@@ -258,8 +258,7 @@ class Halt:
             if self._heard is not None:
                 silent = f"the last that came from it came {unit.bus.now() - self._heard:.1f} s ago"
             return Unconfirmed(
-                f"{commands.said(self.command)} was sent to unit {unit.address} {times} and not confirmed ({error}): "
-                f"{silent}; {may}. "
+                f"{told} was sent to unit {unit.address} {times} and not confirmed ({error}): {silent}; {may}. "
                 f"{await commands.state_afterwards(unit, urgent=True)}",
                 unit=unit.address,
                 **commands.frames_of(error),

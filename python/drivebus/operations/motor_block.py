@@ -164,6 +164,7 @@ class MotorBlock:
         """Ends it, or coasts where that fails. Returns what is left to raise: a failure, and what interrupted it."""
         interrupted: BaseException | None = None
         failure: DrivebusError | None = None
+        most_sent = -1
         attempts = interruptions = 0
         until = unit.bus.now() + self._within
         while attempts <= _END_ATTEMPTS:
@@ -173,7 +174,9 @@ class MotorBlock:
             try:
                 await (self._end(unit, left) if attempts < _END_ATTEMPTS else motion.coast(unit, within=left))
             except DrivebusError as error:
-                failure = error
+                # The one that sent most says how often the drive was told.
+                if (sent := unit.record.halts - sent_before) > most_sent:
+                    failure, most_sent = error, sent
                 attempts += 1
             except GeneratorExit:
                 raise

@@ -150,9 +150,7 @@ def of_recording(
     # All drives of a line are late at the same time.
     picture.late = max((sum(event.drive == drive for event in late) for drive in recording.drives), default=0)
     if not picture.panels and not any(band.lamp for band in picture.bands):
-        raise BadArgument(
-            f"{title}: there is nothing to draw between these moments, or no value that was not 0 all the time"
-        )
+        raise BadArgument(f"{title}: there is nothing to draw: all values in this time are 0. Did the motor run?")
     picture.panels = {unit: picture.panels[unit] for unit in sorted(picture.panels, key=_rank)}
     return picture
 

@@ -127,16 +127,18 @@ impl Profile {
         }
     }
 
-    /// What somebody most likely meant by a name that is none: one that is spelt like it, else what a search finds. Empty
-    /// where neither is there: any other would mislead.
+    /// What somebody most likely meant by a name that is none: what has all its words, else one that is spelt like it, else
+    /// what a search finds. Empty where none is there: any other would mislead.
     fn closest(&self, name: &str) -> Vec<String> {
         if numbered_from_40001(name).is_some() {
             return Vec::new();
         }
-        if let Some(near) = near(name, self.entries().flat_map(names)) {
+        let mut found = self.search_exactly(name, OFFERED);
+        // The label of a measured value may be spelt as the name of a setpoint. One word is in too many labels.
+        let says_more = name.contains(['_', ' ']) && !found.is_empty();
+        if let Some(near) = near(name, self.entries().flat_map(names)).filter(|_| !says_more) {
             return vec![near.to_owned()];
         }
-        let mut found = self.search_exactly(name, OFFERED);
         // A code that is not there stands for no other.
         if found.is_empty() && !name.bytes().any(|letter| letter.is_ascii_digit()) {
             found = self.search_nearly(name, OFFERED);

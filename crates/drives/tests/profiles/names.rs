@@ -32,6 +32,7 @@ fn what_is_not_found_is_explained() {
     };
     assert_eq!(closest("output_curent"), "output_current");
     assert_eq!(closest("setfrequency"), "set_frequency");
+    assert!(closest("output_frequency").starts_with("running_frequency"), "{}", closest("output_frequency"));
     assert_eq!(closest("P00.13"), "P00.03", "the first of those one character away");
     assert_eq!(
         closest("frequency"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import click
 
 import drivebus
@@ -140,10 +142,18 @@ def _show_known(session: Session, text: str) -> None:
     profile = session.known_profile()
     known = _meant(profile.faults(), text) if text else profile.faults()
     if text and not known:
-        raise drivebus.BadArgument(
-            f'{profile.name} names no fault "{text}"; `drivebus faults --all` lists those it names'
-        )
+        raise drivebus.BadArgument(f'{profile.name} names no fault "{text}"; {_instead(profile.faults())}')
     session.out.render(KnownFaults(known, bool(text)))
+
+
+def _instead(known: list[drivebus.Fault]) -> str:
+    """What to do where nothing is named so."""
+    if sum(bool(fault.mnemonic) for fault in known) * 2 < len(known):
+        return (
+            "no known manual prints what its keypad shows. `drivebus faults` asks the drive for the number, and words "
+            "find a fault too: `drivebus faults overcurrent`"
+        )
+    return "`drivebus faults --all` lists those it names"
 
 
 def _show_of_all(session: Session, text: str) -> None:
@@ -159,14 +169,15 @@ def _show_of_all(session: Session, text: str) -> None:
 def _meant(known: list[drivebus.Fault], text: str) -> list[drivebus.Fault]:
     """Those that *text* means: by number, by what the keypad shows, or by words in what is said of them.
 
-    `STo` and `STO` are two faults. Who types neither (`sto`) is shown both.
+    `STo` and `STO` are two faults. Who types neither (`sto`) is shown both. A few letters are a whole word or nothing:
+    `oC` is no part of "block".
     """
-    words = text.lower().split()
+    words = [re.compile(rf"\b{re.escape(word)}" + (r"\b" if len(word) < 4 else "")) for word in text.lower().split()]
     for means in (
         lambda fault: str(fault.code) == (text.lstrip("0") or "0"),
         lambda fault: fault.mnemonic == text,
         lambda fault: fault.mnemonic.lower() == text.lower(),
-        lambda fault: all(word in f"{fault.mnemonic} {fault.label} {fault.cause}".lower() for word in words),
+        lambda fault: all(word.search(f"{fault.mnemonic} {fault.label} {fault.cause}".lower()) for word in words),
     ):
         found = [fault for fault in known if means(fault)]
         if found or text.isdecimal():

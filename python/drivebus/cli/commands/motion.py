@@ -11,6 +11,7 @@ import click
 
 import drivebus
 from drivebus import State
+from drivebus.advice import Text
 from drivebus.cli import names
 from drivebus.cli.option_types import Hertz, Seconds
 from drivebus.cli.parallel import each_drive
@@ -94,8 +95,25 @@ def stop(context: click.Context, session: Session, wait: float | None, every: bo
 def _stop_named(session: Session, wait: float | None, within: float) -> None:
     """Stops the drives that the options name."""
     session.will_write()
-    with session.bus() as bus:
+    with _line_to_halt(session) as bus:
         _stopped(session, session.halt(bus, "stop", lambda drive: drive.stop(within=within)), wait)
+
+
+@contextmanager
+def _line_to_halt(session: Session) -> Iterator[drivebus.Bus]:
+    """The bus, opened; where that fails, a motor may turn that nobody was told to stop."""
+    is_open = False
+    try:
+        with session.bus() as bus:
+            is_open = True
+            yield bus
+    except drivebus.PortError as error:
+        if is_open:
+            raise
+        text = Text(
+            error.text, "; nothing was sent. If the motor turns, stop it at the keypad, or switch the drive off"
+        )
+        raise drivebus.PortError(Text(error.text, goes_on), errno=error.errno) from error
 
 
 def _stopped(session: Session, drive: drivebus.Drive, wait: float | None) -> None:
@@ -111,7 +129,7 @@ def _stopped(session: Session, drive: drivebus.Drive, wait: float | None) -> Non
 def coast(session: Session, within: float) -> None:
     """Switch the output off: the motor freewheels to a stop. Does not ask first."""
     session.will_write()
-    with session.bus() as bus:
+    with _line_to_halt(session) as bus:
         drive = session.halt(bus, "coast", lambda drive: drive.coast(within=within))
         _done(session, drive, "coast")
 
