@@ -35,7 +35,7 @@ RUST_TESTED := --workspace --exclude drivebus-benches
 help: ## what can be made
 	@echo "make demo    a simulated GD350 runs through a whole job"
 	@echo "make test    sets everything up and runs every check"
-	@echo "make lint    format, clippy, rustdoc, ruff, mypy, pyright, stubtest, layers"
+	@echo "make lint    format, clippy, rustdoc, ruff, mypy, pyright, stubtest, layers; compiles for Windows and macOS"
 	@echo "make docs    the documentation as a site with a search, in target/site"
 	@echo "make try-docs   that site in a real browser: wide and narrow, and searched"
 	@echo "make bench   the benchmarks; writes benches/RESULTS.md"
@@ -72,7 +72,7 @@ test:
 	@$(MAKE) --no-print-directory rust-test counts python-test examples wheel-smoke
 	@echo "make test: every check passed"
 
-lint: layers rust-lint types
+lint: layers rust-lint types cross-check
 
 # --- what the machine must have, and the local environment -------------------------------------------------
 
@@ -294,6 +294,7 @@ wheels: $(WHEELS_VENV)/.installed ## some minutes each; see tools/build_wheels.p
 wheels-check: $(WHEELS_VENV)/.installed ## installs and uses what `make wheels` made; see tools/try_wheels.py
 	$(WHEELS_VENV)/bin/python -m tools.try_wheels $(ONLY)
 
+# Seconds, where nothing changed.
 cross-check: ## some minutes the first time; see tools/cross_check.py
 	$(PYTHON) -m tools.cross_check
 

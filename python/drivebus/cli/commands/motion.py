@@ -110,9 +110,7 @@ def _line_to_halt(session: Session) -> Iterator[drivebus.Bus]:
     except drivebus.PortError as error:
         if is_open:
             raise
-        text = Text(
-            error.text, "; nothing was sent. If the motor turns, stop it at the keypad, or switch the drive off"
-        )
+        goes_on = "; nothing was sent. If the motor turns, stop it at the keypad, or switch the drive off"
         raise drivebus.PortError(Text(error.text, goes_on), errno=error.errno) from error
 
 
