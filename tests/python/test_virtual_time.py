@@ -113,10 +113,9 @@ def test_the_first_error_is_kept_when_stopping_fails_too(virtual: Simulator, vir
 
     with pytest.raises(RuntimeError, match="inside") as reason, virtual_drive.running(hz=5.0):
         fail()
-    [note] = getattr(
-        reason.value, "__notes__", ["1 could not be stopped: stop was sent to unit 1 9 times"]
-    )  # as in 3.10
-    assert re.search(r"1 could not be stopped: stop was sent to unit 1 \d+ times", note)
+    sent = r"unit 1 could not be stopped: stop or coast was sent to unit 1 \d+ times"
+    notes = getattr(reason.value, "__notes__", None)  # Python 3.10 has no notes
+    assert notes is None or re.search(sent, notes[0])
     assert commands(virtual)[-1] == COAST
 
 

@@ -174,8 +174,8 @@ class MotorBlock:
             try:
                 await (self._end(unit, left) if attempts < _END_ATTEMPTS else motion.coast(unit, within=left))
             except DrivebusError as error:
-                # The one that sent most says how often the drive was told.
-                if (sent := unit.record.halts - sent_before) > most_sent:
+                # The one that sent most says how often the drive was told; of several, the last.
+                if (sent := unit.record.halts - sent_before) >= most_sent:
                     failure, most_sent = error, sent
                 attempts += 1
             except GeneratorExit:
