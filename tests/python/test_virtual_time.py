@@ -119,6 +119,13 @@ def test_the_first_error_is_kept_when_stopping_fails_too(virtual: Simulator, vir
     assert commands(virtual)[-1] == COAST
 
 
+def test_a_start_that_is_refused_and_taken_is_stopped(virtual: Simulator, virtual_drive: Drive) -> None:
+    virtual.drive(1).refuse(5, asked="writes", taken=True, count=1)
+    with pytest.raises(drivebus.Unconfirmed, match=r"refused.*and yet it turns"), virtual_drive.running(hz=5.0):
+        pytest.fail("the block must not be entered")
+    assert (virtual.drive(1).state, commands(virtual)) == ("stopped", [FORWARD, STOP])
+
+
 def test_a_start_that_is_not_confirmed_is_stopped(virtual: Simulator, virtual_drive: Drive) -> None:
     virtual_drive.write("P00.02", 1, unverified=True)
     with pytest.raises(drivebus.Unconfirmed), virtual_drive.running(hz=5.0):

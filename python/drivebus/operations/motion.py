@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from drivebus import checks
 from drivebus.advice import Text, call
-from drivebus.errors import BadArgument, Unconfirmed
+from drivebus.errors import LINE_ERRORS, BadArgument, Refused, Unconfirmed
 from drivebus.look import Look
 from drivebus.operations import bus_control, commands, setpoints, speed, start_checks, start_sequence, state
 from drivebus.operations.aim import check_harmless
@@ -69,7 +69,7 @@ async def run(
             under bus control, or takes its speed from elsewhere; *hz* is above its maximum; the link is bad; another
             drive answers at this address since the port was opened again; or something is not verified for the
             family: the command, or both ways to stop what it starts. Nothing was sent that moves it.
-        Refused: The drive did not start.
+        Refused: The drive did not start, and does not turn as far as its state can be read.
         NoAnswer, BadAnswer, PortError: The line failed before the command was sent.
         Unconfirmed: The command was sent; the message names the state seen last. It is not repeated. Or the family
             wants other words before it, and the drive does not show one of them: then the command was not sent.
@@ -241,7 +241,12 @@ async def _start(
     prepared = await commands.prepared(unit, command, setpoint)
     if not before.state.running:
         await start_sequence.lead_up(unit, command, confirm)
-    await commands.send(unit, command, prepared)
+    try:
+        await commands.send(unit, command, prepared)
+    except Refused as error:
+        if not before.state.running:
+            await _check_that_it_stands(unit, command, error)
+        raise
 
     async def shows(seen: Look) -> bool:
         if "state" in seen.missing:
@@ -253,6 +258,21 @@ async def _start(
         return now is not None and frequency is not None and now < frequency
 
     await commands.confirm(unit, command, shows, confirm)
+
+
+async def _check_that_it_stands(unit: DriveView, command: str, refused: Refused) -> None:
+    """A drive that refuses a start may have taken it: one look tells, where it can be read."""
+    try:
+        seen = await state.glance(unit)
+    except (*LINE_ERRORS, Refused):
+        return
+    if seen.state.running:
+        raise Unconfirmed(
+            f"{commands.said(command)} was sent to unit {unit.address} and refused ({refused}), and yet it turns: "
+            f"{seen}. It was not repeated",
+            unit=unit.address,
+            **commands.frames_of(refused),
+        ) from refused
 
 
 async def _halt(unit: DriveView, command: str, confirm: float, within: float, *, coasts: bool = False) -> None:
