@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 from collections.abc import Callable, Coroutine
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
@@ -102,7 +103,7 @@ def blocking(
     def method(drive: DriveFace, /, *args: _P.args, **kwargs: _P.kwargs) -> _R:
         return at_once(operation(drive._unit, *args, **kwargs))
 
-    return method
+    return _as_of_a_drive(method)
 
 
 def awaited(
@@ -114,6 +115,15 @@ def awaited(
     async def method(drive: DriveFace, /, *args: _P.args, **kwargs: _P.kwargs) -> _R:
         return await operation(drive._unit, *args, **kwargs)
 
+    return _as_of_a_drive(method)
+
+
+def _as_of_a_drive(method: _F) -> _F:
+    """Has `help` show the drive first, and not the unit that the operation takes."""
+    signature = inspect.signature(method)
+    unit, *others = signature.parameters.values()
+    own = unit.replace(name="self", annotation=inspect.Parameter.empty)
+    method.__signature__ = signature.replace(parameters=[own, *others])  # type: ignore[attr-defined]
     return method
 
 
