@@ -124,7 +124,9 @@ class _Job:
         self.title("All its monitor registers, in two reads")
         values = drive.monitor()
         known = {name: drive.describe(str(name)) for name in values}
-        rows = [[name, known[name].text(value), known[name].unit, known[name].label] for name, value in values.items()]
+        # For a program the numbers, for a person their digits.
+        shown = {name: value if self.out.as_json else known[name].text(value) for name, value in values.items()}
+        rows = [[name, shown[name], row.unit, row.label] for name, row in known.items()]
         self.out.rows(["register", "value", "unit", "what"], rows)
         self.out.say(f"Read in {values.duration * 1000:.1f} ms.")
 
