@@ -57,7 +57,7 @@ class Halt:
         self._within = within
         self._began = self.sent
         self._until = self.sent + within
-        self._frames = 0
+        self._told: list[str] = []
         self._heard: float | None = None
         self._failure: DrivebusError | None = None
 
@@ -84,7 +84,7 @@ class Halt:
         Raises:
             NotAllowed: As for `until_taken`.
         """
-        wanted = self._rota[self._frames % len(self._rota)]
+        wanted = self._rota[len(self._told) % len(self._rota)]
         try:
             target = await self._aim.take(wanted)
             if target is None:
@@ -212,7 +212,7 @@ class Halt:
         profile, record = unit.profile, unit.record
         unit.evidence.require_command(command)
         record.halts_begun += 1
-        self._frames += 1
+        self._told.append(command)
         self.sent = unit.bus.now()
         first = profile.command_first(command)
         # The line knows the unit by its name, and would hold the words of another family back.
@@ -233,8 +233,8 @@ class Halt:
         """Why nothing was taken, in words."""
         unit, error, took = self.unit, self._failure, self.unit.bus.now() - self._began
         may = commands.MAY[self.command]
-        told = " or ".join(map(commands.said, dict.fromkeys(self._rota[: self._frames])))
-        times = f"{self._frames} times within {took:.1f} s" if self._frames != 1 else "once"
+        told = " or ".join(map(commands.said, dict.fromkeys(self._told)))
+        times = f"{len(self._told)} times within {took:.1f} s" if len(self._told) != 1 else "once"
         if isinstance(error, Refused):
             return Refused(
                 f"{told} was sent to unit {unit.address} {times} and not taken, at last: {error}; {may}. "
