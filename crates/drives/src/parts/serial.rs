@@ -49,9 +49,7 @@ impl SerialDefaults {
     pub(crate) fn parse_format(text: &str) -> Option<(u8, char, u8)> {
         match text.as_bytes() {
             // Modbus RTU has 8 data bits.
-            [data @ b'8', parity @ (b'N' | b'E' | b'O'), stop @ (b'1' | b'2')] => {
-                Some((data - b'0', char::from(*parity), stop - b'0'))
-            }
+            [b'8', parity @ (b'N' | b'E' | b'O'), stop @ (b'1' | b'2')] => Some((8, char::from(*parity), stop - b'0')),
             _ => None,
         }
     }
