@@ -92,7 +92,7 @@ def test_every_format_has_the_same_table(ending: str, bus: drivebus.Bus, tmp_pat
     assert found.drives == ["pump", "unit 2"]
     assert [drive["profile"] for drive in found.about["drives"]] == ["gd350", "gd350"]
     assert found.units("pump")["output_current [A]"] == "A"
-    assert [event.kind for event in found.events] == ["recording", "end"]
+    assert [event.kind for event in found.events] == ["recording", *["about"][: ending == "csv"], "end"]
     times = found.times["pump"]
     # Commands and their confirmation let the line's time pass too: a start of a cycle may be missed, none made up for.
     assert 20 <= len(times) <= took / 0.1 + 20
@@ -130,7 +130,7 @@ def test_others_read_it(ending: str, reader: Callable[[Path], int], bus: drivebu
     path = tmp_path / f"run.{ending}"
     with Recorder(path, {bus.drive(1): None}, interval=0.1) as recorder:
         recorder.wait(1.0)
-    assert reader(path) == recorder.rows + 2
+    assert reader(path) == recorder.rows + 2 + (ending == "csv")
 
 
 def test_gaps_and_faults_are_rows_of_their_own(simulator: Simulator, bus: drivebus.Bus, tmp_path: Path) -> None:
@@ -148,7 +148,7 @@ def test_gaps_and_faults_are_rows_of_their_own(simulator: Simulator, bus: driveb
     found = read(tmp_path / "run.csv")
     # Commands and time-outs let beats pass, which have rows of their own.
     events = [event for event in found.events if event.kind != "late"]
-    assert [event.kind for event in events] == ["recording", "gap", "back", "fault", "fault cleared", "end"]
+    assert [event.kind for event in events] == ["recording", "gap", "back", "fault", "fault cleared", "about", "end"]
     gap, back, fault = events[1:4]
     assert "no answer" in gap.text
     assert f"{recorder.missing} samples were missing" in back.text
@@ -346,7 +346,7 @@ def test_nobody_answers(tmp_path: Path) -> None:
     done = CliRunner().invoke(cli, [*words, str(tmp_path / "run.csv"), "--for", "3"], prog_name="drivebus")
     assert done.exit_code == 3, done.output
     assert "no drive answered" in done.stderr
-    assert [event.kind for event in read(tmp_path / "run.csv").events] == ["recording", "gap", "end"]
+    assert [event.kind for event in read(tmp_path / "run.csv").events] == ["recording", "gap", "about", "end"]
 
 
 def test_two_drives_of_one_name_are_refused(bus: drivebus.Bus, tmp_path: Path) -> None:
@@ -408,3 +408,13 @@ def test_a_poll_in_virtual_time_that_never_ran_says_so() -> None:
         with pytest.warns(drivebus.DrivebusWarning, match="its cycles were due and never run; call `wait`"):
             poll.close()
         poll.close()
+
+
+def test_a_csv_file_begins_with_words(bus: drivebus.Bus, tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    with Recorder(path, {bus.drive(1): NAMES[:1]}, interval=0.5, labels={bus.drive(1): "pump"}) as recorder:
+        recorder.wait(1.0)
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert rows[0]["text"] == f"drivebus {drivebus.__version__}, every 0.5 s: pump (gd350)"
+    assert [row["event"] for row in rows[-2:]] == ["about", "end"]
+    assert not any(row["text"] for row in rows[1:-2])

@@ -207,7 +207,7 @@ def test_it_is_looked_at_once_a_second(tmp_path: Path, recwarn: pytest.WarningsR
     series.write(103.5)
     assert len(series.told) == 2
     series.close(103.6)
-    assert [event.kind for event in read(path).events] == ["recording", "moved", "moved", "end"]
+    assert [event.kind for event in read(path).events] == ["recording", "moved", "moved", "about", "end"]
 
 
 @pytest.mark.parametrize("as_json", [False, True])

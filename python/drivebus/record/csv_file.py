@@ -18,6 +18,7 @@ __all__ = ["open_new"]
 
 class _Csv(Appended):
     every = 0.2
+    about_last = True
 
     def __init__(self, path: Path, table: Table) -> None:
         super().__init__(path)

@@ -28,10 +28,13 @@ class Sink(Protocol):
 
     Attributes:
         every: Seconds between two calls of `write` that this format is made for.
+        about_last: Whether the JSON about drives and registers stands before the `end`, out of a reader's way, and
+            the first row tells it in words.
         path: Where it is.
     """
 
     every: float
+    about_last: bool
     path: Path
 
     def write(self, rows: Sequence[Row]) -> None:

@@ -15,6 +15,7 @@ __all__ = ["open_new"]
 
 class _JsonLines(Appended):
     every = 0.2
+    about_last = False
 
     def __init__(self, path: Path, table: Table) -> None:
         super().__init__(path)

@@ -41,6 +41,7 @@ class _Part:
 
 class _Parquet:
     every = 0.5
+    about_last = False
 
     def __init__(self, path: Path, table: Table) -> None:
         self.path = path

@@ -6,7 +6,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -31,7 +31,7 @@ class Event:
     Attributes:
         time: Unix time in seconds.
         drive: Whose it is; empty of what is of no drive.
-        kind: `gap`, `back`, `late`, `fault`, `fault cleared`, `lost`, `moved`, `recording` or `end`.
+        kind: `gap`, `back`, `late`, `fault`, `fault cleared`, `lost`, `moved`, `recording`, `about` or `end`.
         text: What there is to say of it.
     """
 
@@ -45,7 +45,8 @@ class Recording:
     """What stands in one or several files of a recording, in memory.
 
     Attributes:
-        about: What is told of drives, lines, profiles and registers, as the first file has it.
+        about: What is told of drives, lines, profiles and registers, as the first file has it; empty of a CSV file
+            that was cut off.
         drives: The names of the drives, in their order.
         times: Unix times in seconds of the rows with values, by drive.
         states: What the drive was doing, for each of these times; empty where that is not known.
@@ -101,11 +102,11 @@ class Recording:
     def _happened(self, event: Event) -> None:
         self.complete = event.kind == "end"
         self.events.append(event)
-        if event.kind == "recording" and not self.about:
-            try:
-                self.about = json.loads(event.text)
-            except ValueError:
-                self.about = {}
+        if event.kind in ("recording", "about") and not self.about:
+            # The first row of a CSV file tells it in words.
+            with suppress(ValueError):
+                told = json.loads(event.text)
+                self.about = told if isinstance(told, dict) else {}
 
     def _valued(self, drive: str, titles: Iterable[str], row: Cells) -> None:
         known, count = self.values[drive], len(self.times[drive])

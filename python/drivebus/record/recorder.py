@@ -46,7 +46,8 @@ class Recorder:
     'drivebus[parquet]'`). All have the same columns: `time`, `drive`, `event`, `text`, `state`, and one for each
     register, with its unit: `output_current [A]`. A row without an `event` has values. Gaps and faults are rows of
     their own: `gap`, `back`, `late`, `fault`, `fault cleared`, `lost`. The first row is the `recording`, whose text
-    tells the drives, lines, profiles and registers as JSON; the last is the `end`. A file without that was cut off.
+    tells the drives, lines, profiles and registers as JSON; the last is the `end`. A file without that was cut off. A
+    CSV file has words in its first row, and the JSON in a row `about` before the `end`.
 
     Nothing older than a second is lost if this program is killed. If the disk is full, a warning says so, rows are kept
     in memory (100 000 at most), and the file goes on when there is room. If the file is removed, renamed or replaced,

@@ -76,6 +76,7 @@ class Series:
         self._retry_at = self._written_at = float("-inf")
         self._began = self._look_at = now
         self._rows_before = 0
+        self._about = ""
         self._sink: Sink | None = self._open(path, now)
 
     @property
@@ -141,7 +142,7 @@ class Series:
             )
         try:
             if not waiting:
-                sink.write([*self._waiting, self._end_row()])
+                sink.write([*self._waiting, *self._last_rows(sink)])
             sink.close()
         except OSError as error:
             self.problem = self.problem or str(error.strerror or error)
@@ -269,7 +270,7 @@ class Series:
             return
         self._sink = following
         try:
-            sink.write([self._end_row(f"; goes on in {path.name}")])
+            sink.write(self._last_rows(sink, f"; goes on in {path.name}"))
             sink.close()
         except OSError as error:
             self._tell(f"{sink.path} has no end: {error.strerror or error}")
@@ -278,16 +279,20 @@ class Series:
         """A new file, with its first row."""
         sink = sink_for(path, self._table, self._replace)
         started = time()
+        about = self._table.about(started)
         try:
-            sink.write([Row(started, "", "recording", self._table.about(started))])
+            sink.write([Row(started, "", "recording", self._table.in_words() if sink.about_last else about)])
         except OSError as error:
             with suppress(OSError):
                 sink.close()
             path.unlink(missing_ok=True)
             raise NotAllowed(f"{path} cannot be written: {error.strerror or error}; nothing was recorded") from None
         self.files.append(path)
+        self._about = about
         self._began, self._look_at, self._rows_before = now, now + LOOK, self.rows
         return sink
 
-    def _end_row(self, goes_on: str = "") -> Row:
-        return Row(time(), "", "end", f"{self._counted()}{goes_on}")
+    def _last_rows(self, sink: Sink, goes_on: str = "") -> list[Row]:
+        now = time()
+        about = [Row(now, "", "about", self._about)] if sink.about_last else []
+        return [*about, Row(now, "", "end", f"{self._counted()}{goes_on}")]

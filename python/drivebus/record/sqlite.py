@@ -17,6 +17,7 @@ __all__ = ["open_new"]
 
 class _Sqlite:
     every = 0.2
+    about_last = False
 
     def __init__(self, path: Path, table: Table) -> None:
         self.path = path

@@ -112,11 +112,17 @@ class Table:
             drive.label: [drive.rows.get(column.name) if _owns(drive, column) else None for column in self.columns]
             for drive in drives
         }
-        self._about = {
+        self._about: dict[str, Any] = {
             "drivebus": version,
             "interval": interval,
             "drives": [_about(drive) for drive in drives],
         }
+
+    def in_words(self) -> str:
+        """What is recorded, for whoever opens the file: `drivebus 0.1.0, every 0.5 s: pump (gd350)`."""
+        rate = "as fast as the line allows" if self._about["interval"] is None else f"every {self._about['interval']} s"
+        drives = ", ".join(f"{drive['name']} ({drive['profile']})" for drive in self._about["drives"])
+        return f"drivebus {self._about['drivebus']}, {rate}: {drives}"
 
     def about(self, started: float) -> str:
         """What is told of a file that begins at *started*, as JSON: drives, lines, profiles, registers."""
