@@ -35,6 +35,7 @@ from drivebus.operations.drive_view import DriveView
 from drivebus.operations.former_names import BlockingFormerNames
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
+from drivebus.plain_annotations import plain_annotations
 from drivebus.profile import Profile
 from drivebus.strict_attributes import known_only
 from drivebus.values import Value
@@ -43,6 +44,7 @@ from drivebus.watchdog import Watchdog
 __all__ = ["Drive", "check_drive"]
 
 
+@plain_annotations
 @known_only
 class Drive(BlockingFormerNames):
     """One drive on a line: its commands, values and state. `drivebus.Bus.drive` makes it.

@@ -29,7 +29,9 @@ def later(package: str, homes: Mapping[str, Sequence[str]], modules: Sequence[st
         home = next((home for home, names in homes.items() if name in names), None)
         if home is None:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        found: object = getattr(_loaded(f"{package}.{home}"), name)
+        from drivebus.plain_annotations import plain_annotations
+
+        found: object = plain_annotations(getattr(_loaded(f"{package}.{home}"), name))
         setattr(sys.modules[package], name, found)
         return found
 

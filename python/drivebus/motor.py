@@ -6,11 +6,13 @@ from types import TracebackType
 
 from drivebus.line.blocking import at_once
 from drivebus.operations.turning import MotorFace, turning_of
+from drivebus.plain_annotations import plain_annotations
 from drivebus.strict_attributes import known_only
 
 __all__ = ["Motor"]
 
 
+@plain_annotations
 @known_only
 class Motor(MotorFace):
     """The motor of a drive inside one block of the program. `Drive.motor` makes it.

@@ -18,11 +18,13 @@ from typing import Any
 from drivebus import _native, checks
 from drivebus.errors import BadArgument, DrivebusWarning, level_of_the_program
 from drivebus.line.poll_samples import MOST_SAMPLES, Batch, Key, Polling, Sample, how_many, poller_of, seconds
+from drivebus.plain_annotations import plain_annotations
 from drivebus.strict_attributes import known_only
 
 __all__ = ["Poll"]
 
 
+@plain_annotations
 @known_only
 class Poll(Polling[Key]):
     """Polls the same values of the same drives until it, or its bus, is closed. `Bus.poll` makes it.

@@ -88,6 +88,7 @@ def test_a_name_loads_what_it_stands_on() -> None:
         "drivebus",
         "drivebus.lazy_names",
         "drivebus.attribute_mapping",
+        "drivebus.plain_annotations",
         "drivebus.tables",
         "drivebus.values",
     }
@@ -96,7 +97,13 @@ def test_a_name_loads_what_it_stands_on() -> None:
 def test_the_version_is_told_without_the_commands() -> None:
     program = "import sys; sys.argv[1:] = ['--version']; from drivebus.cli import main; main()"
     modules = loaded(f"{program}; before = set(sys.modules)")
-    assert ours(modules) == {"drivebus", "drivebus._native", "drivebus.cli", "drivebus.lazy_names"}
+    assert ours(modules) == {
+        "drivebus",
+        "drivebus._native",
+        "drivebus.cli",
+        "drivebus.lazy_names",
+        "drivebus.plain_annotations",
+    }
     assert "click" not in modules
     assert not slow(modules)
 

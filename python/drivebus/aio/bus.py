@@ -35,6 +35,7 @@ from drivebus.operations.drive_base import documented_by, views
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.program_end import end_over
 from drivebus.operations.stop_all import stop_all
+from drivebus.plain_annotations import plain_annotations
 from drivebus.profile import Profile, native_of
 from drivebus.strict_attributes import known_only
 
@@ -46,6 +47,7 @@ __all__ = ["Bus"]
 _AnyDrive = TypeVar("_AnyDrive", bound=Drive)
 
 
+@plain_annotations
 @known_only
 class Bus(BusFace):
     """One line, as `drivebus.Bus`, for asyncio.

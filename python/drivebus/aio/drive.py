@@ -31,6 +31,7 @@ from drivebus.operations.drive_view import DriveView
 from drivebus.operations.former_names import AwaitedFormerNames
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.motor_block import MotorBlock
+from drivebus.plain_annotations import plain_annotations
 from drivebus.profile import Profile
 from drivebus.strict_attributes import known_only
 from drivebus.values import Value
@@ -38,6 +39,7 @@ from drivebus.values import Value
 __all__ = ["Drive"]
 
 
+@plain_annotations
 @known_only
 class Drive(AwaitedFormerNames):
     """A drive, as `drivebus.aio.Bus.drive` gives it: what `drivebus.Drive` has, awaitable.

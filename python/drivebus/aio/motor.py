@@ -7,11 +7,13 @@ from types import TracebackType
 from drivebus.aio.awake import Awake
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.turning import MotorFace, turning_of
+from drivebus.plain_annotations import plain_annotations
 from drivebus.strict_attributes import known_only
 
 __all__ = ["Motor"]
 
 
+@plain_annotations
 @known_only
 class Motor(MotorFace):
     """The motor of a drive inside one `async with` block. `Drive.motor` makes it; otherwise as `drivebus.Motor`."""

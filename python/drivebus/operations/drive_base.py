@@ -12,6 +12,7 @@ from drivebus.line.protocols import AwaitableBus
 from drivebus.line.units import units_of
 from drivebus.operations import registers
 from drivebus.operations.drive_view import DriveView
+from drivebus.plain_annotations import plain_annotations
 from drivebus.profile import Profile
 from drivebus.values import Description, Value
 
@@ -120,7 +121,7 @@ def awaited(
 
 def _as_of_a_drive(method: _F) -> _F:
     """Has `help` show the drive first, and not the unit that the operation takes."""
-    signature = inspect.signature(method)
+    signature = inspect.signature(plain_annotations(method))
     unit, *others = signature.parameters.values()
     own = unit.replace(name="self", annotation=inspect.Parameter.empty)
     method.__signature__ = signature.replace(parameters=[own, *others])  # type: ignore[attr-defined]
