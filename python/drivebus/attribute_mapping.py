@@ -42,5 +42,12 @@ class Named(Mapping[K, T]):
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *(name for name in self._values if isinstance(name, str))]
 
+    def _repr_html_(self) -> str:
+        """A table, for a notebook."""
+        from html import escape
+
+        rows = (f"<tr><th>{escape(str(name))}</th><td>{escape(str(value))}</td></tr>" for name, value in self.items())
+        return f"<table>{''.join(rows)}</table>"
+
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in self.items())})"

@@ -24,6 +24,7 @@ OPTION = re.compile(r"`--|`drivebus |\(--")
 OF_PROGRAMS = (
     "to_numpy()",
     "to_pandas()",
+    "to_polars()",
     "poll() takes",
     "read() needs",
     "with_variants()",

@@ -207,6 +207,34 @@ class TestFrames:
         with still.poll({pair[0]: None}) as poll, pytest.raises(ImportError, match=r"pip install 'drivebus\[pandas\]'"):
             poll.batch(1).to_pandas()
 
+    def test_polars_has_the_same_numbers(self, still: Bus, pair: tuple[Drive, Drive]) -> None:
+        pytest.importorskip("polars")
+        pytest.importorskip("pandas")
+        drive, _ = pair
+        with still.poll({drive: ["output_current", "status_word_1"], 9: [(0x2100, 2)]}, interval=0.2) as poll:
+            batch = poll.batch(8)
+        for key, frame in batch.to_pandas().items():
+            found = batch.to_polars()[key]
+            assert found.columns == ["time", *frame.columns]
+            # pandas keeps nanoseconds, and polars is asked for microseconds.
+            moments = [moment.timestamp() for moment in frame.index]
+            assert [each.timestamp() for each in found["time"]] == pytest.approx(moments, abs=2e-6)
+            for name in frame.columns:
+                assert found[name].to_list() == [None if value != value else value for value in frame[name]]
+
+    def test_without_polars_it_says_what_to_install(
+        self, still: Bus, pair: tuple[Drive, Drive], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setitem(sys.modules, "polars", None)
+        with still.poll({pair[0]: None}) as poll, pytest.raises(ImportError, match=r"pip install 'drivebus\[polars\]'"):
+            poll.batch(1).to_polars()
+
+    def test_a_sample_is_a_table_in_a_notebook(self, still: Bus, pair: tuple[Drive, Drive]) -> None:
+        with still.poll({pair[0]: ["output_current"]}) as poll:
+            [sample] = poll.batch(1)
+        shown = f"<table><tr><th>output_current</th><td>{sample['output_current']}</td></tr></table>"
+        assert sample._repr_html_() == shown
+
 
 class TestCallback:
     def test_in_virtual_time_it_is_called_by_whoever_waits(self, still: Bus, pair: tuple[Drive, Drive]) -> None:

@@ -166,3 +166,13 @@ def test_a_change_of_the_surface_shows() -> None:
 
 if __name__ == "__main__":
     FROZEN.write_text("\n".join(surface()) + "\n", encoding="utf-8")
+
+
+def test_signatures_are_shown_without_quotes() -> None:
+    """As `help` and a notebook show them."""
+    both = [getattr(face, name) for face in (drivebus, drivebus.aio) for name in ("Bus", "Drive", "Poll")]
+    functions: list[Any] = [member for face in both for member in vars(face).values() if inspect.isfunction(member)]
+    functions += [inspect.unwrap(drivebus.Bus.read), drivebus.Recorder.wait, drivebus.search]
+    shown = [repr(each) for function in functions for each in function.__annotations__.values()]
+    assert len(shown) > 100
+    assert [each for each in shown if each.startswith(("'", '"'))] == []

@@ -20,6 +20,7 @@ from drivebus.values import Value
 if TYPE_CHECKING:
     import numpy.typing
     import pandas
+    import polars
     from typing_extensions import TypeVar
 
     # Whoever writes `Poll` or `Batch` alone means one of anything.
@@ -223,6 +224,26 @@ class Batch(Sequence[Sample[Key]], Generic[Key]):
             frame = pandas.DataFrame({name: array[name] for name in target.columns()}, index=moments)
             frame.attrs["units"] = target.units()
             frames[key] = frame
+        return frames
+
+    def to_polars(self) -> dict[Key, polars.DataFrame]:
+        """One DataFrame for each drive (or unit) that was polled, with a row for each of its samples.
+
+        The column `time` is `Sample.time` as a moment in UTC. There is one for each name (of a unit without a profile,
+        each address such as `"0x3000"`): all Float64, null where the sample is missing.
+
+        Raises:
+            ImportError: polars or numpy is not installed.
+        """
+        try:
+            import polars
+        except ImportError:
+            raise ImportError("to_polars() needs polars: pip install 'drivebus[polars]'") from None
+        frames: dict[Key, polars.DataFrame] = {}
+        for target, (key, array) in zip(self._targets, self.to_numpy().items(), strict=True):
+            moments = polars.Series("time", array["time"] * 1e6).cast(polars.Datetime("us", "UTC"))
+            values = [polars.Series(name, array[name], nan_to_null=True) for name in target.columns()]
+            frames[key] = polars.DataFrame([moments, *values])
         return frames
 
     def _decoded(self) -> list[Sample[Key]]:
