@@ -54,6 +54,8 @@ class UnitRecord:
         identities: What it said of itself, by the name of the profile in whose words it was asked.
         trusted: The names of profiles under which it was asked for as `unverified`.
         last_state: The state that was seen last, in words, and when on the line's clock.
+        shown: The state that was seen last, and the fault in words where it was in one.
+        is_lost: Whether the line failed when it was asked last.
         in_ram: Parameters that were written to RAM and not to EEPROM since: what they read as is then not stored.
         stores: How often each parameter was written to EEPROM.
         starts: How many starts were sent, or were about to be.
@@ -69,6 +71,8 @@ class UnitRecord:
     identities: dict[str, Identity] = field(default_factory=dict)
     trusted: set[str] = field(default_factory=set)
     last_state: tuple[str, float] | None = None
+    shown: tuple[State, str | None] | None = None
+    is_lost: bool = False
     in_ram: set[str] = field(default_factory=set)
     stores: Counter[str] = field(default_factory=Counter)
     starts: int = 0

@@ -22,7 +22,7 @@ from drivebus.errors import (
 )
 from drivebus.identify.harm import HALTS
 from drivebus.look import Look
-from drivebus.operations import raw_words, setpoints, state
+from drivebus.operations import events, raw_words, setpoints, state
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.stop_proof import Fall
 from drivebus.values import ControlSource
@@ -105,6 +105,7 @@ async def send(unit: DriveView, name: str, words: Words | None = None) -> None:
     first = unit.profile.command_first(name)
     if first is None:
         await send_word(unit, name, address, payload)
+        events.took(unit, said(name))
         return
     before = unit.record.halts_begun
     await send_word(unit, name, *first)
@@ -119,6 +120,7 @@ async def send(unit: DriveView, name: str, words: Words | None = None) -> None:
         await send_word(unit, name, address, payload)
     except NotReady as error:
         raise halted from error
+    events.took(unit, said(name))
 
 
 async def send_word(unit: DriveView, name: str, address: int, payload: int | Sequence[int]) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from drivebus.errors import LINE_ERRORS, BadAnswer, DrivebusError, NoAnswer, NotAllowed, PortError, Refused, Unconfirmed
 from drivebus.identify.harm import harmed
 from drivebus.line.frames import may_be_of
-from drivebus.operations import commands, raw_words, state
+from drivebus.operations import commands, events, raw_words, state
 from drivebus.operations.aim import ANSWER_WITHIN, Aim, Target
 from drivebus.operations.drive_view import DriveView
 
@@ -228,6 +228,7 @@ class Halt:
                 raise
         record.halts += 1
         self.confirmed = unit.bus.now()
+        events.took(unit, commands.said(command))
 
     async def failure(self) -> DrivebusError:
         """Why nothing was taken, in words."""

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from drivebus import _native, checks, tables
-from drivebus.errors import PortError, Refused
+from drivebus.errors import LINE_ERRORS, PortError, Refused
 from drivebus.line.asking import Read, Write
 from drivebus.line.write_guard import check_words
+from drivebus.operations import events
 from drivebus.operations.aim import check_harmless
 from drivebus.operations.by_name import by_name
 from drivebus.operations.drive_view import DriveView
@@ -148,7 +149,11 @@ def explained(unit: DriveView) -> Iterator[None]:
     """A block in which a refusal says what this family means by its code, and what it was that was refused."""
     try:
         yield
+    except LINE_ERRORS as error:
+        events.failed(unit, error)
+        raise
     except Refused as error:
+        events.answered(unit)
         name, meaning = unit.profile.exception(error.code)
         if name == _UNKNOWN and error.name != _NOWHERE:
             name = error.name
@@ -166,6 +171,7 @@ def explained(unit: DriveView) -> Iterator[None]:
             started=error.started,
             ended=error.ended,
         ) from None
+    events.answered(unit)
 
 
 def _about_password(unit: DriveView, exception: str) -> str:

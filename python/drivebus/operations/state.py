@@ -13,7 +13,7 @@ from typing import NamedTuple
 from drivebus.errors import BadArgument
 from drivebus.line.asking import Read
 from drivebus.look import Look
-from drivebus.operations import raw_words, registers
+from drivebus.operations import events, raw_words, registers
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.plan import ReadPlan
@@ -90,6 +90,7 @@ async def glance(unit: DriveView, *, urgent: bool = False) -> Look:
         told,
     )
     remember(unit, str(seen))
+    events.saw(unit, seen.state, str(seen.fault or "not named") if seen.tripped else None)
     return seen
 
 
