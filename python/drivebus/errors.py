@@ -92,6 +92,11 @@ class DrivebusError(Exception):
         return _rebuild, (type(self), self.text, dict(self.__dict__))
 
     @property
+    def may_have_taken(self) -> bool:
+        """Whether a drive may have taken what was asked of it. False: it surely has not, and it may be asked again."""
+        return True
+
+    @property
     def text(self) -> Text:
         """The message, with the calls and arguments that it names as data: each face has its own words for them."""
         return Text(*self.args[:1])
@@ -102,7 +107,21 @@ class DrivebusError(Exception):
         return tuple(part for part in self.text.parts if isinstance(part, Advice))
 
 
-class PortError(DrivebusError, OSError):
+_READS = (0x01, 0x02, 0x03, 0x04)
+
+
+class _LineError(DrivebusError):
+    """What a line can do to any request: of one that left, nothing is known."""
+
+    @property
+    def may_have_taken(self) -> bool:
+        """See `DrivebusError`. Of one request it is known whether that was sent, and a read asks for nothing."""
+        if self.request:
+            return self.started is not None and self.request[1] not in _READS
+        return self.unit is not None
+
+
+class PortError(_LineError, OSError):
     """The port is missing, busy, not permitted, or lost. The next call opens it again.
 
     Did the drive take it? If the port was lost after the request had left, it may have.
@@ -123,14 +142,14 @@ class PortError(DrivebusError, OSError):
         return rebuild, (kind, message, {**state, "errno": self.errno})
 
 
-class NoAnswer(DrivebusError, TimeoutError):
+class NoAnswer(_LineError, TimeoutError):
     """The unit stayed silent.
 
     Did the drive take it? It may have: a silent drive has either not heard the request, or its answer was lost.
     """
 
 
-class BadAnswer(DrivebusError):
+class BadAnswer(_LineError):
     """Bytes came, but not a valid answer to the request. They are in `raw`.
 
     Did the drive take it? It may have: only its answer is known to be bad.
@@ -200,6 +219,11 @@ class Refused(DrivebusError):
         self.means = means
 
     @property
+    def may_have_taken(self) -> bool:
+        """See `DrivebusError`: where *means* is `"taken"`, it has."""
+        return self.means == "taken"
+
+    @property
     def is_decision(self) -> bool:
         """Whether the drive has decided that it does not do it: *means* is `"no_such"` or `"not_now"`."""
         return self.means in ("no_such", "not_now")
@@ -219,6 +243,11 @@ class NotReached(Unconfirmed, TimeoutError):
     Did the drive take it? Nothing was sent but reads. It goes on as it was; the message names the state that was seen
     last.
     """
+
+    @property
+    def may_have_taken(self) -> bool:
+        """See `DrivebusError`: there was nothing to take."""
+        return False
 
 
 class NotStopped(Unconfirmed):
@@ -244,6 +273,11 @@ class NotAllowed(DrivebusError, ValueError):
 
     Did the drive take it? No: what was asked was not sent.
     """
+
+    @property
+    def may_have_taken(self) -> bool:
+        """See `DrivebusError`: nothing was sent."""
+        return False
 
 
 class BadArgument(NotAllowed):

@@ -79,6 +79,7 @@ class TestLooking:
         [row] = rows(run("--json", "read", name))
         assert (row["name"], row["value"]) == ("P00.03", 50.0)
 
+    @pytest.mark.skipif(sys.platform == "win32", reason="over TCP a new line is asked more than once in any case")
     def test_read_can_ask_twice(self, pty: drivebus.Simulator) -> None:
         asked = []
         for words in (["read", "P00.03", "3002H"], ["read", "--verify", "P00.03", "3002H"]):

@@ -88,6 +88,7 @@ def test_the_help_warns_that_the_unit_is_hex_and_each_echo_says_it_in_decimal() 
     assert asked == ["unit 17: read 2100H", "unit 11: read 2100H"]
 
 
+@no_pty
 def test_the_prompt_completes_names_and_keeps_its_history() -> None:
     with Conversation("--port", VIRTUAL, "--profile", "gd350", "raw", "--yes") as talk:
         talk.until("raw> ")
