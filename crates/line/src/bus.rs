@@ -5,6 +5,7 @@
 //! | `errand` | a request whose caller does not wait in a thread of its own |
 //! | `clock`, `openings`, `figures` | the line's time, how often it was opened, and what happened at it |
 //! | `wills` | what programs leave to be done when they are gone |
+//! | `programs` | the numbers of those who use the line through this program |
 //! | `port` | one line, and what all have in common who use it |
 //! | `call` | one call from its place in the queue to its end |
 //! | `listen` | hearing the line without asking |
@@ -28,6 +29,8 @@ mod host;
 mod listen;
 mod openings;
 mod port;
+#[cfg(any(feature = "tcp", all(unix, feature = "share")))]
+pub(crate) mod programs;
 mod shared;
 #[cfg_attr(not(all(unix, feature = "share")), path = "bus/no_sharing.rs")]
 mod sharing;
@@ -45,6 +48,8 @@ use drivebus_rtu::{Answer, Destination, Instant, Meanings, Request, UnitAddress}
 use crate::ask::Done;
 use crate::bus::call::Call;
 use crate::bus::port::Port;
+#[cfg(feature = "tcp")]
+use crate::bus::programs::Seat;
 use crate::bus::shared::Shared;
 use crate::error::{CallError, Failure};
 use crate::health::link::Link;
@@ -322,6 +327,12 @@ impl Bus {
     /// system allows that; where it does not, [`notes`](Self::notes) says so. In virtual time nothing is asked for.
     pub fn enter_thread(&self) {
         self.port().enter_thread();
+    }
+
+    /// A number for one more program that uses the line through this one.
+    #[cfg(feature = "tcp")]
+    pub(crate) fn seat(&self) -> Seat {
+        self.port().programs.seat()
     }
 
     /// Whether frames are told apart by something else than silence.

@@ -88,6 +88,7 @@ mod bus {
     mod listen;
     mod openings;
     pub(crate) mod port;
+    pub(crate) mod programs;
     pub(crate) mod shared;
     // Between the bus and its door: programs come in to the port of one that shares with nobody else.
     #[path = "no_sharing.rs"]

@@ -89,8 +89,7 @@ impl<'b, 'r> Call<'b, 'r> {
         }
     }
 
-    /// It is another program's, which uses the line through this one.
-    #[cfg(all(unix, feature = "share"))]
+    /// Whose it is, of those who use the line through this program.
     pub(crate) fn of_program(mut self, program: Program) -> Self {
         self.program = program;
         self

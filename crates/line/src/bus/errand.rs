@@ -13,6 +13,7 @@ use crate::ask::Done;
 use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
 use crate::system::sync::atomic::AtomicBool;
+use crate::turns::order::Program;
 
 /// A request, and who is told what became of it.
 pub struct Errand {
@@ -24,6 +25,8 @@ pub struct Errand {
     /// For a request that is carried as it is.
     answer: Option<AnswerLength>,
     pub(super) options: CallOptions,
+    /// Whose it is, of those who use the line through this program.
+    pub(super) program: Program,
     pub(super) wanted: Arc<AtomicBool>,
     /// Taken when it is called.
     then: Option<Then>,
@@ -57,7 +60,15 @@ impl Errand {
             _ => None,
         };
         let wanted = Arc::new(AtomicBool::new(true));
-        Self { destination, frame, is_fresh_echo: false, answer, options, wanted, then: Some(Box::new(then)) }
+        let then: Option<Then> = Some(Box::new(then));
+        Self { destination, frame, is_fresh_echo: false, answer, options, program: Program::default(), wanted, then }
+    }
+
+    /// It is another program's, which uses the line through this one.
+    #[cfg(feature = "tcp")]
+    pub(crate) fn of_program(mut self, program: Program) -> Self {
+        self.program = program;
+        self
     }
 
     /// As [`new`](Self::new), for an echo of a word that no echo still under way carries. Which one that is, is known where

@@ -19,6 +19,7 @@ use crate::ask::Ask;
 use crate::bus::call::{Call, Wanted};
 use crate::bus::errand::pdu_of;
 use crate::bus::port::Port;
+use crate::bus::programs::{Programs, Seat};
 use crate::error::Failure;
 use crate::health::stats::{Program as Counted, Stats};
 use crate::line::{PortError, PortErrorKind};
@@ -89,7 +90,8 @@ struct Entry {
     name: String,
     process: u32,
     life: Arc<Life>,
-    program: Program,
+    /// Its number, while it is here.
+    seat: Weak<Seat>,
     connections: AtomicUsize,
     calls: AtomicU64,
     answered: AtomicU64,
@@ -181,7 +183,13 @@ impl Guests {
     }
 
     /// Lets a program in; `Err` says why not.
-    fn enter(self: &Arc<Self>, hello: &Hello, process: u32, stream: Arc<Kept<UnixStream>>) -> Result<Visit, String> {
+    fn enter(
+        self: &Arc<Self>,
+        hello: &Hello,
+        process: u32,
+        stream: Arc<Kept<UnixStream>>,
+        programs: &Arc<Programs>,
+    ) -> Result<Visit, String> {
         let mut inside = self.lock();
         let name = readable(&hello.program);
         // A process that this one cannot see is told from others by its name alone.
@@ -210,15 +218,14 @@ impl Guests {
                 ));
             }
         }
+        let seat = known.as_ref().and_then(|entry| entry.seat.upgrade());
+        let seat = seat.unwrap_or_else(|| Arc::new(programs.seat()));
         let entry = known.unwrap_or_else(|| {
-            let is_here = |entry: &&Arc<Entry>| entry.connections.load(Ordering::Relaxed) > 0;
-            let taken: Vec<u16> = inside.programs.iter().filter(is_here).map(|entry| entry.program.0).collect();
-            let number = (1..u16::MAX).find(|number| !taken.contains(number)).unwrap_or(u16::MAX);
             let entry = Arc::new(Entry {
                 name,
                 process,
                 life: Arc::new(Life::of(process)),
-                program: Program(number),
+                seat: Arc::downgrade(&seat),
                 connections: AtomicUsize::new(0),
                 calls: AtomicU64::new(0),
                 answered: AtomicU64::new(0),
@@ -236,7 +243,7 @@ impl Guests {
         inside.connections += 1;
         let number = inside.connections;
         inside.streams.insert(number, stream);
-        Ok(Visit { guests: Arc::clone(self), entry, number, is_for_a_stop: hello.is_for_a_stop })
+        Ok(Visit { guests: Arc::clone(self), entry, seat, number, is_for_a_stop: hello.is_for_a_stop })
     }
 }
 
@@ -244,6 +251,7 @@ impl Guests {
 struct Visit {
     guests: Arc<Guests>,
     entry: Arc<Entry>,
+    seat: Arc<Seat>,
     number: u64,
     is_for_a_stop: bool,
 }
@@ -324,7 +332,7 @@ fn let_in(
             hello.characters
         ));
     }
-    let visit = guests.enter(&hello, process, channel.end())?;
+    let visit = guests.enter(&hello, process, channel.end(), &port.programs)?;
     channel.depends_on(Arc::clone(&visit.entry.life));
     let welcome =
         Welcome { program: process::own_name(), process: std::process::id(), reconnects: port.figures.reconnects() };
@@ -341,7 +349,7 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, port: &Weak<Port>) -> Option<
         Wish::Call(order) if visit.is_for_a_stop && !order.is_stop() => return None,
         Wish::Call(order) => {
             visit.entry.calls.fetch_add(1, Ordering::Relaxed);
-            let told = call(channel, &port, &order, visit.entry.program)?;
+            let told = call(channel, &port, &order, visit.seat.program)?;
             if matches!(told, Told::Answer { .. }) {
                 visit.entry.answered.fetch_add(1, Ordering::Relaxed);
             }

@@ -14,6 +14,8 @@ use crate::bus::clock::Clock;
 use crate::bus::errand::Errand;
 use crate::bus::figures::Figures;
 use crate::bus::halts_told::HaltsTold;
+#[cfg(any(feature = "tcp", all(unix, feature = "share")))]
+use crate::bus::programs::Programs;
 use crate::bus::wills::Wills;
 use crate::error::Failure;
 use crate::options::{BusOptions, CallOptions, UnitOptions};
@@ -56,6 +58,9 @@ pub(crate) struct Port {
     opened_by: Process,
     clock: Clock,
     pub(super) trace: Trace,
+    /// Those who use the line through this program.
+    #[cfg(any(feature = "tcp", all(unix, feature = "share")))]
+    pub(super) programs: Arc<Programs>,
     /// What is left to be done for programs that are gone.
     pub(super) wills: Arc<Wills>,
     ends: OnceLock<Arc<dyn Ends>>,
@@ -89,6 +94,8 @@ impl Port {
             opened_by: Process::current(),
             clock,
             trace: Trace::default(),
+            #[cfg(any(feature = "tcp", all(unix, feature = "share")))]
+            programs: Arc::default(),
             wills,
             ends: OnceLock::new(),
         }

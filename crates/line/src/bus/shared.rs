@@ -96,7 +96,8 @@ impl Shared {
     ) -> Option<Result<Done, Box<CallError>>> {
         let request = errand.request(|| self.port.words.next())?;
         let ask = self.port.ask(errand.destination, &request, &errand.options);
-        let mut call = Call::new(&self.port, ask, errand.options).while_wanted(&*errand.wanted);
+        let mut call =
+            Call::new(&self.port, ask, errand.options).of_program(errand.program).while_wanted(&*errand.wanted);
         Some(call.run_in(turn, &mut || self.port.is_shut(), take))
     }
 

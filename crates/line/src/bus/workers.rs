@@ -9,7 +9,7 @@ use crate::error::Failure;
 use crate::system::sync::atomic::{AtomicBool, Ordering};
 use crate::system::sync::thread;
 use crate::turns::crew::Employer;
-use crate::turns::order::{Priority, Ticket};
+use crate::turns::order::{Claim, Priority, Ticket};
 use crate::turns::queue::{NoTurn, Turn};
 
 /// An errand on its way.
@@ -58,7 +58,8 @@ impl Bus {
         let priority = errand.options.priority.unwrap_or(if is_write { Priority::Write } else { Priority::Read });
         let unit = errand.destination.unit();
         let wanted = Arc::clone(&errand.wanted);
-        match self.port().queue.leave_work((priority, unit).into(), errand, || Box::new(Worked(Arc::downgrade(self)))) {
+        let claim = Claim { priority, unit, program: errand.program };
+        match self.port().queue.leave_work(claim, errand, || Box::new(Worked(Arc::downgrade(self)))) {
             Ok(ticket) => Some(Running { bus: Arc::downgrade(self), ticket, wanted }),
             Err((errand, why)) => {
                 let failure = if why == NoTurn::Full { self.port().no_turn(why) } else { Failure::Closed };
