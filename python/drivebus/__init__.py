@@ -52,6 +52,7 @@ if TYPE_CHECKING:
         Unverified,
         WrongDrive,
     )
+    from drivebus.gateway import Gateway, GatewayStats
     from drivebus.identify.results import Found, Identification
     from drivebus.line.poll_samples import Batch, Sample
     from drivebus.line.serial_ports import SerialPort, ports
@@ -99,6 +100,8 @@ __all__ = [
     "Exchange",
     "Fault",
     "Found",
+    "Gateway",
+    "GatewayStats",
     "Identification",
     "Link",
     "Located",
@@ -156,6 +159,7 @@ if not TYPE_CHECKING:
             "bus": ("Bus",),
             "discovery": ("Discovery",),
             "drive": ("Drive",),
+            "gateway": ("Gateway", "GatewayStats"),
             "errors": (
                 "BadAnswer",
                 "BadArgument",

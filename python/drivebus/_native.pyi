@@ -658,6 +658,19 @@ class Plan:
         """
 
 @final
+class Gateway:
+    """A server for Modbus TCP before a bus."""
+
+    def __new__(cls, bus: Bus, address: str, within: float, /) -> Gateway:
+        """Listens at once. PortError: not at *address*."""
+    @property
+    def address(self) -> str: ...
+    def stats(self) -> dict[str, int]:
+        """`clients`, `let_in`, `cut_off`, `gave_way`, `requests`, `answered`, `refused`, `failed`, `late`, `busy`."""
+    def take_told(self) -> list[str]: ...
+    def close(self) -> None: ...
+
+@final
 class Poller:
     """Reads that go on in cycles, in a thread of the core's own; in virtual time, in whoever waits."""
 

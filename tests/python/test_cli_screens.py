@@ -99,6 +99,7 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "decode a capture": (["decode", "line.pcapng"], 0),
     "sniff": (["--port", ONE, "sniff", "--for", "1"], 0),
     "replay": (["replay", "line.pcapng"], 0),
+    "share": (["--port", ONE, "share", "--tcp", "127.0.0.1:0"], 0),
     "hal": (["--port", ONE, "hal", "--rpm-per-hz", "60", "--hal-path", "."], 2),
     "completion": (["completion", "bash"], 0),
     "nobody answers": (["--port", ONE, "--unit", "9", "status"], 3),
@@ -112,6 +113,7 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
 WHILE: dict[str, Callable[[list[str]], bool]] = {
     "sim": lambda lines: any("Ctrl-C" in line for line in lines),
     "replay": lambda lines: any("Ctrl-C" in line for line in lines),
+    "share": lambda lines: any("Ctrl-C" in line for line in lines),
     "try without leave": lambda lines: any("Go ahead?" in line for line in lines),
     "run without leave": lambda lines: any("Go ahead?" in line for line in lines),
     "panel": lambda lines: any("stopped, 0.00" in line for line in lines),

@@ -37,7 +37,7 @@
 //! | feature | what it brings |
 //! | --- | --- |
 //! | `serial` | serial ports of this machine |
-//! | `tcp` | serial servers (`socket://`) and Modbus TCP (`tcp://`) |
+//! | `tcp` | serial servers (`socket://`), Modbus TCP (`tcp://`), and a server for it |
 //! | `share` | ports that programs of one user share, over Unix sockets; elsewhere it changes nothing |
 //!
 //! # Limits
@@ -67,11 +67,14 @@
 //! | `owner` | who has the turn: what is known of the line and its units, and one exchange at a time |
 //! | `bus` | the bus as its callers see it: calls, errands, listening |
 //! | `poll` | what a bus asks again and again by itself |
+//! | `gateway` | a server for Modbus TCP before a bus |
 
 mod ask;
 mod bus;
 mod by_unit;
 mod error;
+#[cfg(feature = "tcp")]
+pub mod gateway;
 mod health;
 mod line;
 #[cfg(test)]

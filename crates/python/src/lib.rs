@@ -14,6 +14,7 @@ mod ending;
 mod errors;
 mod format;
 mod frames;
+mod gateway;
 mod mailbox;
 mod open;
 mod overhear;
@@ -46,6 +47,8 @@ mod _native {
         crc16, decode, decode_answer, encode_echo, encode_read, encode_write, frame_len, frames_in, is_write, judge,
         misses, only_reads, touched,
     };
+    #[pymodule_export]
+    use crate::gateway::Gateway;
     #[pymodule_export]
     use crate::mailbox::Mailbox;
     #[pymodule_export]

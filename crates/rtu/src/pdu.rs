@@ -59,6 +59,10 @@ impl ExceptionCode {
     pub const ILLEGAL_VALUE: Self = Self(0x03);
     /// 04H: the unit could not do it.
     pub const DEVICE_FAILURE: Self = Self(0x04);
+    /// 06H: the unit is busy, and may be asked again later.
+    pub const BUSY: Self = Self(0x06);
+    /// 0AH: a gateway cannot use the line that the unit is on.
+    pub const GATEWAY_PATH_UNAVAILABLE: Self = Self(0x0A);
     /// 0BH: a gateway passed the request on, and heard no answer of the unit.
     pub const GATEWAY_TARGET_SILENT: Self = Self(0x0B);
 

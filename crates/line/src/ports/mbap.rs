@@ -27,10 +27,10 @@ use crate::system::clock::{monotonic, sleep_until};
 pub const DEFAULT_PORT: u16 = crate::ports::url::MODBUS_TCP_PORT;
 
 /// Transaction, protocol and length: what comes before the unit.
-const PREFIX: usize = 6;
+pub(crate) const PREFIX: usize = 6;
 /// Fewest and most bytes of unit and PDU.
-const MIN_BODY: usize = 2;
-const MAX_BODY: usize = 254;
+pub(crate) const MIN_BODY: usize = 2;
+pub(crate) const MAX_BODY: usize = 254;
 /// Transactions without an answer that are kept.
 const MAX_OPEN: usize = 32;
 /// Bytes of a CRC.

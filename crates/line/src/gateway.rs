@@ -1,0 +1,174 @@
+//! Modbus TCP, served: programs that speak it read the units of a line, in the queue of the bus that has it.
+//!
+//! Each connection is a program of the queue: one that asks much takes no more turns than one that asks little, and a stop
+//! goes before them all. What cannot be answered in time is answered by 0BH, and never afterwards for that transaction; what
+//! is not sent by then, or when the client hangs up, is taken back. Only reads are let pass.
+//!
+//! | room | what is in it |
+//! | --- | --- |
+//! | `requests` | what clients send, taken apart |
+//! | `rights` | what they may ask |
+//! | `desk` | what one of them has asked, and when it has to be answered |
+//! | `clients` | how many there may be, and who gives way |
+//! | `counts` | what happened |
+//! | `mailbox`, `connection` | the two threads of each |
+//!
+//! Source: *Modbus Messaging on TCP/IP Implementation Guide* V1.0b, §3.1.3 and §4.4.
+
+mod clients;
+mod connection;
+mod counts;
+mod desk;
+mod mailbox;
+mod requests;
+mod rights;
+
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Weak};
+use std::thread;
+use std::time::Duration;
+
+pub use counts::GatewayStats;
+pub use requests::{Asked, NotModbus, Requests};
+
+use crate::bus::Bus;
+use crate::gateway::clients::Clients;
+use crate::gateway::connection::Connection;
+use crate::gateway::counts::Counts;
+use crate::system::clock::{LOOK_UP, monotonic};
+
+/// How long an answer may take, where nothing else is said.
+pub const ANSWER_WITHIN: Duration = Duration::from_secs(1);
+/// How long is waited for the thread at the door when it is told to end.
+const TO_END: Duration = Duration::from_secs(1);
+
+/// A server for Modbus TCP before a [`Bus`], until it is dropped. It keeps the bus from nothing: where that is closed, clients
+/// are told 0AH.
+///
+/// ```no_run
+/// # fn example(bus: std::sync::Arc<drivebus_line::Bus>) -> std::io::Result<()> {
+/// use drivebus_line::gateway::{ANSWER_WITHIN, Gateway};
+///
+/// let gateway = Gateway::open(&bus, "127.0.0.1:1502", ANSWER_WITHIN)?;
+/// println!("reads are answered at {}", gateway.address());
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Gateway {
+    address: SocketAddr,
+    clients: Arc<Clients>,
+    counts: Arc<Counts>,
+    is_closed: Arc<AtomicBool>,
+}
+
+impl Gateway {
+    /// Listens at `address`, such as `127.0.0.1:1502`; port 0 takes one that is free. Each answer goes out `within` that of
+    /// its request.
+    ///
+    /// # Errors
+    ///
+    /// The system's: the address is not one of this machine, is taken, or may not be listened at.
+    pub fn open(bus: &Arc<Bus>, address: &str, within: Duration) -> io::Result<Self> {
+        let addresses: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
+        let listener = TcpListener::bind(&addresses[..])?;
+        let gateway = Self {
+            address: listener.local_addr()?,
+            clients: Arc::default(),
+            counts: Arc::default(),
+            is_closed: Arc::default(),
+        };
+        let door = Door {
+            bus: Arc::downgrade(bus),
+            within,
+            clients: Arc::clone(&gateway.clients),
+            counts: Arc::clone(&gateway.counts),
+            is_closed: Arc::clone(&gateway.is_closed),
+        };
+        thread::Builder::new().name("drivebus-tcp-door".to_owned()).spawn(move || door.stand(&listener))?;
+        Ok(gateway)
+    }
+
+    /// Where it listens.
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// What has happened so far.
+    pub fn stats(&self) -> GatewayStats {
+        self.counts.stats(self.clients.count())
+    }
+
+    /// What was refused or cut off since this was asked last, in words: the latest 256.
+    pub fn take_told(&self) -> Vec<String> {
+        self.counts.take_told()
+    }
+
+    /// Ends all connections, and listens no more. What clients asked and is not sent is taken back. Closing again does nothing.
+    pub fn close(&self) {
+        if !self.is_closed.swap(true, Ordering::AcqRel) {
+            self.clients.close();
+            // Wakes the thread at the door. Where nobody can connect, nobody has to be kept out.
+            let _ = TcpStream::connect_timeout(&reachable(self.address), TO_END);
+        }
+    }
+}
+
+impl Drop for Gateway {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+/// Where this machine reaches what listens at `address`.
+fn reachable(address: SocketAddr) -> SocketAddr {
+    let ip = match address.ip() {
+        IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
+        IpAddr::V6(ip) if ip.is_unspecified() => Ipv6Addr::LOCALHOST.into(),
+        ip => ip,
+    };
+    SocketAddr::new(ip, address.port())
+}
+
+/// Who lets clients in.
+struct Door {
+    bus: Weak<Bus>,
+    within: Duration,
+    clients: Arc<Clients>,
+    counts: Arc<Counts>,
+    is_closed: Arc<AtomicBool>,
+}
+
+impl Door {
+    fn stand(&self, listener: &TcpListener) {
+        while !self.is_closed.load(Ordering::Acquire) {
+            let served = match listener.accept() {
+                Ok(_) if self.is_closed.load(Ordering::Acquire) => return,
+                Ok((stream, peer)) => self.let_in(stream, peer),
+                Err(error) => Err(error),
+            };
+            if let Err(error) = served {
+                self.counts.tell(format!("a client cannot be let in now: {error}"));
+                // No file is left to open, most likely: that does not end by being tried at once.
+                thread::sleep(LOOK_UP);
+            }
+        }
+    }
+
+    fn let_in(&self, stream: TcpStream, peer: SocketAddr) -> io::Result<()> {
+        let Some(bus) = self.bus.upgrade() else { return Ok(()) };
+        let seat = bus.seat();
+        drop(bus);
+        let host = peer.ip().to_canonical();
+        let Some((place, gone)) = self.clients.enter(stream.try_clone()?, host, monotonic()) else { return Ok(()) };
+        if gone.is_some() {
+            self.counts.gave_way(peer);
+        }
+        self.counts.let_in();
+        let counts = Arc::clone(&self.counts);
+        let connection = Connection { bus: Weak::clone(&self.bus), seat, peer, place, within: self.within, counts };
+        connection::serve(connection, stream)
+    }
+}

@@ -1,0 +1,142 @@
+//! Who is connected, how many may be, and who gives way to one more.
+
+use std::net::{IpAddr, Shutdown, TcpStream};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use drivebus_rtu::Instant;
+
+/// Connections at a time, of all and of one host.
+pub(super) const MOST: usize = 64;
+pub(super) const MOST_OF_ONE: usize = 16;
+
+/// One connection.
+#[derive(Debug)]
+struct Client {
+    number: u64,
+    host: IpAddr,
+    /// When it asked last, or came.
+    asked: Instant,
+    stream: TcpStream,
+}
+
+/// Who is connected.
+#[derive(Debug, Default)]
+pub(super) struct Clients {
+    inside: Mutex<Inside>,
+}
+
+#[derive(Debug, Default)]
+struct Inside {
+    numbers: u64,
+    clients: Vec<Client>,
+    is_closed: bool,
+}
+
+impl Clients {
+    fn lock(&self) -> MutexGuard<'_, Inside> {
+        self.inside.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Lets the other end of `stream` in. Where no more may be, the one that has not asked for the longest gives way, and its
+    /// host is told; `None`: nobody comes in any more.
+    pub(super) fn enter(
+        self: &Arc<Self>,
+        stream: TcpStream,
+        host: IpAddr,
+        now: Instant,
+    ) -> Option<(Place, Option<IpAddr>)> {
+        let mut inside = self.lock();
+        if inside.is_closed {
+            return None;
+        }
+        let hosts: Vec<(IpAddr, Instant)> = inside.clients.iter().map(|one| (one.host, one.asked)).collect();
+        let gone = gives_way(&hosts, host).map(|place| inside.clients.remove(place));
+        if let Some(gone) = &gone {
+            // Its own threads see that, and end.
+            let _ = gone.stream.shutdown(Shutdown::Both);
+        }
+        inside.numbers += 1;
+        let number = inside.numbers;
+        inside.clients.push(Client { number, host, asked: now, stream });
+        Some((Place { clients: Arc::clone(self), number }, gone.map(|gone| gone.host)))
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.lock().clients.len()
+    }
+
+    /// Ends all connections; nobody comes in any more.
+    pub(super) fn close(&self) {
+        let mut inside = self.lock();
+        inside.is_closed = true;
+        for client in &inside.clients {
+            let _ = client.stream.shutdown(Shutdown::Both);
+        }
+    }
+}
+
+/// A connection that was let in, until this is dropped.
+#[derive(Debug)]
+pub(super) struct Place {
+    clients: Arc<Clients>,
+    number: u64,
+}
+
+impl Place {
+    /// It asks `now`.
+    pub(super) fn asks(&self, now: Instant) {
+        if let Some(client) = self.clients.lock().clients.iter_mut().find(|one| one.number == self.number) {
+            client.asked = now;
+        }
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.clients.lock().clients.retain(|one| one.number != self.number);
+    }
+}
+
+/// Which of `clients`, each with when it asked last, gives way to one more from `host`.
+fn gives_way(clients: &[(IpAddr, Instant)], host: IpAddr) -> Option<usize> {
+    let of_host = clients.iter().filter(|(other, _)| *other == host).count();
+    let is_full_for_it = of_host >= MOST_OF_ONE;
+    if !is_full_for_it && clients.len() < MOST {
+        return None;
+    }
+    let may = |other: IpAddr| !is_full_for_it || other == host;
+    let rest = clients.iter().enumerate().filter(|(_, (other, _))| may(*other));
+    rest.min_by_key(|(_, (_, asked))| *asked).map(|(place, _)| place)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    fn host(number: u8) -> IpAddr {
+        IpAddr::from([10, 0, 0, number])
+    }
+
+    fn asked(seconds: u64) -> Instant {
+        Instant::ZERO + Duration::from_secs(seconds)
+    }
+
+    #[test]
+    fn one_host_gives_way_to_itself() {
+        let mut clients: Vec<_> = (0..15).map(|number| (host(1), asked(100 - number))).collect();
+        clients.push((host(2), asked(0)));
+        assert_eq!(gives_way(&clients, host(1)), None);
+        clients.push((host(1), asked(50)));
+        assert_eq!(gives_way(&clients, host(1)), Some(16));
+        assert_eq!(gives_way(&clients, host(2)), None);
+    }
+
+    #[test]
+    fn of_all_the_one_that_has_not_asked_for_the_longest() {
+        let clients: Vec<_> = (0..64).map(|number| (host(number % 5), asked(200 - u64::from(number)))).collect();
+        assert_eq!(gives_way(&clients[..63], host(9)), None);
+        assert_eq!(gives_way(&clients, host(9)), Some(63));
+    }
+}

@@ -1,0 +1,216 @@
+//! One connection: a thread that reads, and one at the desk, which asks the line and writes the answers.
+
+use std::collections::BTreeMap;
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::net::{Shutdown, SocketAddr, TcpStream};
+use std::sync::{Arc, Weak};
+use std::time::Duration;
+
+use drivebus_rtu::{ExceptionCode, Instant};
+
+use crate::bus::Bus;
+use crate::bus::errand::Errand;
+use crate::bus::programs::Seat;
+use crate::bus::workers::Running;
+use crate::gateway::clients::Place;
+use crate::gateway::counts::Counts;
+use crate::gateway::desk::{Desk, code_of, refused};
+use crate::gateway::mailbox::{Found, Mail, Mailbox};
+use crate::gateway::requests::{Asked, Requests};
+use crate::gateway::rights::{Judged, judge};
+use crate::options::CallOptions;
+use crate::system::clock::monotonic;
+
+/// Requests of one connection on their way to the line.
+pub(super) const IN_FLIGHT: usize = 16;
+/// How long a request may take to come whole, and a client to take an answer.
+const HURRY: Duration = Duration::from_secs(1);
+/// How long a connection stays open that asks nothing.
+const IDLE: Duration = Duration::from_secs(60);
+/// What is read at a time.
+const CHUNK: usize = 4_096;
+
+/// What both threads of a connection have.
+pub(super) struct Connection {
+    pub(super) bus: Weak<Bus>,
+    pub(super) seat: Seat,
+    pub(super) peer: SocketAddr,
+    pub(super) place: Place,
+    pub(super) within: Duration,
+    pub(super) counts: Arc<Counts>,
+}
+
+/// Serves the other end of `stream` to its end.
+///
+/// # Errors
+///
+/// The system's: it gives no thread, or no second handle of the stream.
+pub(super) fn serve(connection: Connection, stream: TcpStream) -> std::io::Result<()> {
+    // An answer is one small message, and its client waits for it.
+    stream.set_nodelay(true)?;
+    stream.set_write_timeout(Some(HURRY))?;
+    let mailbox = Arc::new(Mailbox::default());
+    let reader = stream.try_clone()?;
+    let letters = Arc::clone(&mailbox);
+    std::thread::Builder::new().name("drivebus-tcp-in".to_owned()).spawn(move || {
+        let why = read(reader, &letters);
+        letters.end(why);
+    })?;
+    let letters = Arc::clone(&mailbox);
+    let desk = std::thread::Builder::new().name("drivebus-tcp".to_owned());
+    let spawned = desk.spawn(move || {
+        let desk = Desk::new(connection.within, IN_FLIGHT);
+        let why = Clerk { connection, desk, on_their_way: BTreeMap::new() }.work(&stream, &letters);
+        letters.end(why);
+        // The reader waits there.
+        let _ = stream.shutdown(Shutdown::Both);
+    });
+    if spawned.is_err() {
+        mailbox.end(String::new());
+    }
+    spawned.map(drop)
+}
+
+/// Reads requests until the connection ends; why it does, for people, empty where the client ended it.
+fn read(mut stream: TcpStream, mailbox: &Mailbox) -> String {
+    let mut requests = Requests::default();
+    let mut bytes = [0; CHUNK];
+    // When what is there began: the request that is not whole, or the time without one.
+    let mut since = monotonic();
+    loop {
+        let limit = if requests.has_begun() { HURRY } else { IDLE };
+        let left = (since + limit).saturating_duration_since(monotonic());
+        let came =
+            if left.is_zero() { Err(ErrorKind::TimedOut.into()) } else { read_within(&mut stream, left, &mut bytes) };
+        match came {
+            Ok(0) => return String::new(),
+            Ok(count) => {
+                let now = monotonic();
+                let had_begun = requests.has_begun();
+                let mut asked_any = false;
+                let mut is_heard = true;
+                let taken = requests.take(&bytes[..count], |asked| {
+                    asked_any = true;
+                    is_heard = is_heard && mailbox.ask(asked, now);
+                });
+                if let Err(wrong) = taken {
+                    return wrong.to_string();
+                }
+                if !is_heard {
+                    return String::new();
+                }
+                if asked_any || !had_begun {
+                    since = now;
+                }
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                if monotonic() < since + limit {
+                    continue;
+                }
+                return if requests.has_begun() {
+                    format!("a request that was not whole within {} s", HURRY.as_secs())
+                } else {
+                    format!("no request for {} s", IDLE.as_secs())
+                };
+            }
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(_) => return String::new(),
+        }
+    }
+}
+
+fn read_within(stream: &mut TcpStream, left: Duration, bytes: &mut [u8]) -> std::io::Result<usize> {
+    // The system takes no time-out below its own grain.
+    stream.set_read_timeout(Some(left.max(Duration::from_millis(1))))?;
+    stream.read(bytes)
+}
+
+/// Who is at the desk.
+struct Clerk {
+    connection: Connection,
+    desk: Desk,
+    on_their_way: BTreeMap<u64, Running>,
+}
+
+impl Clerk {
+    /// Asks and answers until the connection ends; why it does.
+    fn work(mut self, stream: &TcpStream, mailbox: &Arc<Mailbox>) -> String {
+        let why = loop {
+            let message = match mailbox.next(self.desk.due()) {
+                Found::Over(why) => break why,
+                Found::Nothing => None,
+                Found::Mail(Mail::Asked(asked, at)) => self.ask(&asked, at, mailbox),
+                Found::Mail(Mail::Came(number, result)) => {
+                    self.came(number, result.as_deref().map_err(|error| code_of(error)))
+                }
+            };
+            let late = self.desk.late(monotonic());
+            for (number, _) in &late {
+                self.connection.counts.late();
+                // What has not been sent is not sent any more.
+                if let Some(running) = self.on_their_way.remove(number) {
+                    running.abandon();
+                }
+            }
+            let mut all = message.into_iter().chain(late.into_iter().map(|(_, message)| message));
+            if let Some(why) = all.find_map(|message| write(stream, &message).err()) {
+                break why;
+            }
+        };
+        for running in self.on_their_way.values() {
+            running.abandon();
+        }
+        if !why.is_empty() {
+            self.connection.counts.cut_off(self.connection.peer, &why);
+        }
+        why
+    }
+
+    /// Asks the line, or answers at once.
+    fn ask(&mut self, asked: &Asked, at: Instant, mailbox: &Arc<Mailbox>) -> Option<Vec<u8>> {
+        self.connection.place.asks(at);
+        self.connection.counts.asked();
+        let (destination, request) = match judge(asked.unit, &asked.pdu) {
+            Judged::Asked(destination, request) => (destination, request),
+            Judged::Wrong(code) => return Some(refused(asked, code)),
+            Judged::Refused => {
+                self.connection.counts.refused(self.connection.peer, asked);
+                return Some(refused(asked, ExceptionCode::ILLEGAL_FUNCTION));
+            }
+        };
+        let Some(bus) = self.connection.bus.upgrade().filter(|bus| !bus.is_closed()) else {
+            return Some(refused(asked, ExceptionCode::GATEWAY_PATH_UNAVAILABLE));
+        };
+        let Some(number) = self.desk.take(asked, at) else {
+            self.connection.counts.busy();
+            return Some(refused(asked, ExceptionCode::BUSY));
+        };
+        let letters = Arc::clone(mailbox);
+        let errand = Errand::new(destination, &request, CallOptions::new(), move |result| {
+            letters.come(number, result.map(|reply| reply.pdu));
+        });
+        if let Some(running) = bus.send(errand.of_program(self.connection.seat.program)) {
+            self.on_their_way.insert(number, running);
+        }
+        None
+    }
+
+    /// The answer by what came; none where the client was answered before.
+    fn came(&mut self, number: u64, result: Result<&[u8], ExceptionCode>) -> Option<Vec<u8>> {
+        self.on_their_way.remove(&number);
+        let message = self.desk.came(number, result)?;
+        self.connection.counts.answered(result.is_ok());
+        Some(message)
+    }
+}
+
+/// Writes `message`; the error is why the connection ends.
+fn write(mut stream: &TcpStream, message: &[u8]) -> Result<(), String> {
+    stream.write_all(message).map_err(|error| match error.kind() {
+        ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+            format!("an answer that was not taken within {} s", HURRY.as_secs())
+        }
+        // It has hung up.
+        _ => String::new(),
+    })
+}

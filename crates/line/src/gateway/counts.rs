@@ -1,0 +1,124 @@
+//! What happened at a gateway: counted, and told in words.
+
+use std::collections::VecDeque;
+use std::net::SocketAddr;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use crate::error::Hex;
+use crate::gateway::requests::Asked;
+
+/// Words that nobody has fetched; the oldest give way.
+const KEPT: usize = 256;
+
+/// What happened at a gateway so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct GatewayStats {
+    /// Connections that are open.
+    pub clients: usize,
+    /// Connections that were let in.
+    pub let_in: u64,
+    /// Connections that were ended here: what came was no request, came too slowly, or an answer was not taken.
+    pub cut_off: u64,
+    /// Connections that gave way to others.
+    pub gave_way: u64,
+    /// Requests.
+    pub requests: u64,
+    /// Requests that were answered by what the unit said.
+    pub answered: u64,
+    /// Requests that are not allowed.
+    pub refused: u64,
+    /// Requests that were answered by an exception of this program: nobody answered, or the port is away.
+    pub failed: u64,
+    /// Requests that were answered by 0BH because their time was up.
+    pub late: u64,
+    /// Requests beyond those that one connection may have on their way.
+    pub busy: u64,
+}
+
+/// The same, while it happens.
+#[derive(Debug, Default)]
+pub(super) struct Counts {
+    let_in: AtomicU64,
+    cut_off: AtomicU64,
+    gave_way: AtomicU64,
+    requests: AtomicU64,
+    answered: AtomicU64,
+    refused: AtomicU64,
+    failed: AtomicU64,
+    late: AtomicU64,
+    busy: AtomicU64,
+    told: Mutex<VecDeque<String>>,
+}
+
+fn count(counter: &AtomicU64) {
+    counter.fetch_add(1, Ordering::Relaxed);
+}
+
+impl Counts {
+    pub(super) fn let_in(&self) {
+        count(&self.let_in);
+    }
+
+    pub(super) fn cut_off(&self, peer: SocketAddr, why: &str) {
+        count(&self.cut_off);
+        self.tell(format!("{peer} was cut off: {why}"));
+    }
+
+    pub(super) fn gave_way(&self, to: SocketAddr) {
+        count(&self.gave_way);
+        self.tell(format!("as many clients are connected as may: one that asked nothing gave way to {to}"));
+    }
+
+    pub(super) fn asked(&self) {
+        count(&self.requests);
+    }
+
+    pub(super) fn answered(&self, by_unit: bool) {
+        count(if by_unit { &self.answered } else { &self.failed });
+    }
+
+    pub(super) fn refused(&self, peer: SocketAddr, asked: &Asked) {
+        count(&self.refused);
+        let shown = &asked.pdu[..asked.pdu.len().min(16)];
+        let more = if shown.len() < asked.pdu.len() { " …" } else { "" };
+        self.tell(format!("{peer} may only read units 1 to 247, and asked unit {}: {}{more}", asked.unit, Hex(shown)));
+    }
+
+    pub(super) fn late(&self) {
+        count(&self.late);
+    }
+
+    pub(super) fn busy(&self) {
+        count(&self.busy);
+    }
+
+    pub(super) fn tell(&self, words: String) {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if told.len() == KEPT {
+            told.pop_front();
+        }
+        told.push_back(words);
+    }
+
+    pub(super) fn take_told(&self) -> Vec<String> {
+        self.told.lock().unwrap_or_else(PoisonError::into_inner).drain(..).collect()
+    }
+
+    pub(super) fn stats(&self, clients: usize) -> GatewayStats {
+        let of = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        GatewayStats {
+            clients,
+            let_in: of(&self.let_in),
+            cut_off: of(&self.cut_off),
+            gave_way: of(&self.gave_way),
+            requests: of(&self.requests),
+            answered: of(&self.answered),
+            refused: of(&self.refused),
+            failed: of(&self.failed),
+            late: of(&self.late),
+            busy: of(&self.busy),
+        }
+    }
+}

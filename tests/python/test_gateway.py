@@ -1,0 +1,319 @@
+"""Modbus TCP, served: what clients get, what they may not, and what keeps them from the line.
+
+Clients are pymodbus, and bytes of a socket of this test's own. The line is the simulator's.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, cast
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymodbus.client import ModbusTcpClient
+
+import drivebus
+from drivebus import Bus, Gateway, Simulator
+
+from .conftest import NO_PTY
+
+IS = 0x01A0
+"""What a GD350 answers at 2103H."""
+HERE = "127.0.0.1:0"
+
+
+@pytest.fixture(scope="module")
+def simulator() -> Iterator[Simulator]:
+    with Simulator({1: "gd350", 2: "vfd500"}, transport="process", clock="virtual") as simulator:
+        yield simulator
+
+
+@pytest.fixture(scope="module")
+def bus(simulator: Simulator) -> Iterator[Bus]:
+    with Bus(simulator, timeout=0.1, retries=0) as bus:
+        yield bus
+
+
+@pytest.fixture
+def gateway(bus: Bus) -> Iterator[Gateway]:
+    with Gateway(bus, HERE) as gateway:
+        yield gateway
+
+
+def connected(gateway: Gateway) -> socket.socket:
+    host, port = gateway.address.rsplit(":", 1)
+    return socket.create_connection((host, int(port)), timeout=20)
+
+
+def request(transaction: int, unit: int, pdu: bytes) -> bytes:
+    return struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu
+
+
+def exactly(client: socket.socket, count: int) -> bytes:
+    came = b""
+    while len(came) < count:
+        piece = client.recv(count - len(came))
+        if not piece:
+            raise EOFError(came)
+        came += piece
+    return came
+
+
+def answer(client: socket.socket) -> tuple[int, int, bytes]:
+    transaction, protocol, length, unit = struct.unpack(">HHHB", exactly(client, 7))
+    assert protocol == 0
+    return transaction, unit, exactly(client, length - 1)
+
+
+def asked(gateway: Gateway, unit: int, pdu: bytes) -> bytes:
+    with connected(gateway) as client:
+        client.sendall(request(7, unit, pdu))
+        transaction, of, pdu = answer(client)
+    assert (transaction, of) == (7, unit)
+    return pdu
+
+
+def is_cut_off(client: socket.socket) -> bool:
+    try:
+        return client.recv(1) == b""
+    except ConnectionResetError:
+        return True
+
+
+@contextmanager
+def pymodbus(gateway: Gateway) -> Iterator[ModbusTcpClient]:
+    host, port = gateway.address.rsplit(":", 1)
+    client = ModbusTcpClient(host, port=int(port), timeout=20, retries=0)
+    assert client.connect()  # type: ignore[no-untyped-call]
+    try:
+        yield client
+    finally:
+        client.close()  # type: ignore[no-untyped-call]
+
+
+def test_pymodbus_reads_what_the_bus_reads(gateway: Gateway, bus: Bus) -> None:
+    with pymodbus(gateway) as client:
+        assert client.read_holding_registers(0x2103, count=1, device_id=1).registers == [IS]
+        assert client.read_holding_registers(0x3000, count=5, device_id=1).registers == bus.read(1, 0x3000, 5)
+        refused = client.read_holding_registers(0x6300, count=1, device_id=1)
+        assert (refused.isError(), refused.exception_code) == (True, 2)
+        silent = client.read_holding_registers(0x2103, count=1, device_id=9)
+        assert (silent.isError(), silent.exception_code) == (True, 0x0B)
+    stats = gateway.stats
+    assert (stats.requests, stats.answered, stats.failed, stats.refused) == (4, 2, 2, 0)
+
+
+def test_nothing_but_reads_gets_through(gateway: Gateway, simulator: Simulator) -> None:
+    """Every function, in the form that it has and in others; the drives hear of none of them."""
+    for unit in (1, 2):
+        simulator.drive(unit).take_writes()
+    before = simulator.line.requests
+    with pymodbus(gateway) as client:
+        assert client.write_register(0x2000, 1, device_id=1).exception_code == 1
+        assert client.write_registers(0x2000, [1, 5000], device_id=1).exception_code == 1
+        assert client.write_coil(0, True, device_id=1).exception_code == 1
+    for function in [*range(5, 0x80), 0]:
+        assert asked(gateway, 1, bytes([function, 0x20, 0, 0, 1])) == bytes([function | 0x80, 1]), function
+    # What is a command in Huanyang's own protocol.
+    assert asked(gateway, 1, b"\x03\x01\x01") == b"\x83\x01"
+    for unit in (0, *range(248, 256)):
+        assert asked(gateway, unit, b"\x03\x21\x03\x00\x01") == b"\x83\x01"
+    assert asked(gateway, 1, b"\x03\x21\x03\x00\x7e") == b"\x83\x03"
+    assert simulator.line.requests == before
+    assert not simulator.drive(1).take_writes()
+    assert not simulator.drive(2).take_writes()
+    told = gateway.told()
+    assert "may only read units 1 to 247, and asked unit 1: 06 20 00 00 01" in told[0]
+    assert gateway.stats.refused == len(told) == 3 + 124 + 1 + 9
+
+
+@settings(max_examples=60)
+@given(
+    asked_for=st.lists(
+        st.tuples(st.integers(0, 0xFFFF), st.sampled_from([1, 2, 9]), st.integers(0x3000, 0x3010), st.integers(1, 8)),
+        min_size=1,
+        max_size=16,
+    )
+)
+def test_each_transaction_has_its_own_answer(bus: Bus, asked_for: list[tuple[int, int, int, int]]) -> None:
+    """As many as may be on their way at once, in one piece; what the bus reads is the oracle."""
+    with Gateway(bus, HERE, answer_within=30.0) as gateway, connected(gateway) as client:
+        frames = [request(number, unit, struct.pack(">BHH", 3, at, count)) for number, unit, at, count in asked_for]
+        client.sendall(b"".join(frames))
+        came = sorted(answer(client) for _ in asked_for)
+    assert came == sorted((number, unit, expected(bus, unit, at, count)) for number, unit, at, count in asked_for)
+
+
+def expected(bus: Bus, unit: int, at: int, count: int) -> bytes:
+    try:
+        words = bus.read(unit, at, count)
+    except drivebus.NoAnswer:
+        return b"\x83\x0b"
+    except drivebus.Refused as error:
+        return bytes([0x83, error.code])
+    return bytes([3, 2 * count]) + struct.pack(f">{count}H", *words)
+
+
+@pytest.mark.parametrize(
+    ("bytes_", "said"),
+    [
+        (b"GET / HTTP/1.1\r\n\r\n", "protocol 21536 in the header"),
+        (struct.pack(">HHH", 1, 0, 0xFFFF), "length 65535 in the header"),
+        (struct.pack(">HHHB", 1, 0, 1, 1), "length 1 in the header"),
+        (b"\x16\x03\x01\x02\x00\x01", "protocol 258 in the header"),
+    ],
+)
+def test_what_is_no_modbus_is_cut_off_and_told(
+    gateway: Gateway, simulator: Simulator, bytes_: bytes, said: str
+) -> None:
+    before = simulator.line.requests
+    with connected(gateway) as client:
+        client.sendall(bytes_)
+        assert is_cut_off(client)
+    assert [said in text for text in gateway.told()] == [True]
+    assert gateway.stats.cut_off == 1
+    assert simulator.line.requests == before
+
+
+def test_half_a_request_is_cut_off_after_a_second(gateway: Gateway) -> None:
+    with connected(gateway) as client:
+        client.sendall(request(1, 1, b"\x03\x21\x03\x00\x01")[:-1])
+        assert is_cut_off(client)
+    assert ["not whole within 1 s" in text for text in gateway.told()] == [True]
+
+
+def test_one_that_asks_too_much_is_told_busy_and_the_rest_is_answered(gateway: Gateway) -> None:
+    count = 10_000
+    with connected(gateway) as client:
+        sender = threading.Thread(
+            target=client.sendall,
+            args=(b"".join(request(n & 0xFFFF, 1, b"\x03\x21\x03\x00\x01") for n in range(count)),),
+        )
+        sender.start()
+        came = [answer(client) for _ in range(count)]
+        sender.join()
+    assert sorted(transaction for transaction, _, _ in came) == list(range(count))
+    assert {pdu for _, _, pdu in came} <= {b"\x03\x02\x01\xa0", b"\x83\x06", b"\x83\x0b"}
+    stats = gateway.stats
+    assert stats.requests == count == stats.answered + stats.busy + stats.late + stats.failed
+
+
+def seen(condition: Callable[[], bool]) -> None:
+    """Waits, in the time of other threads, until *condition* holds."""
+    while not condition():
+        threading.Event().wait(0.001)
+
+
+def test_what_is_not_sent_when_its_client_hangs_up_is_never_sent() -> None:
+    """One is on the wire, to a unit that does not answer; fifteen wait behind it."""
+    with (
+        Simulator({1: "gd350"}, transport="process") as simulator,
+        Bus(simulator, timeout=1.0, retries=0) as bus,
+        Gateway(bus, HERE, answer_within=30.0) as gateway,
+        connected(gateway) as client,
+    ):
+        client.sendall(request(0, 9, b"\x03\x21\x03\x00\x01"))
+        seen(lambda: simulator.line.requests == 1)
+        client.sendall(b"".join(request(n, 1, b"\x03\x21\x03\x00\x01") for n in range(1, 16)))
+        seen(lambda: gateway.stats.requests == 16)
+        client.close()
+        seen(lambda: gateway.stats.clients == 0)
+        assert bus.read(1, 0x2103) == [IS]
+        # The one to unit 9, and this program's.
+        assert simulator.line.requests == 2
+
+
+def test_an_answer_that_is_late_never_comes() -> None:
+    with (
+        Simulator({1: "gd350"}, transport="process") as simulator,
+        Bus(simulator, timeout=2.0, retries=0) as bus,
+        Gateway(bus, HERE, answer_within=0.05) as gateway,
+        connected(gateway) as client,
+    ):
+        simulator.line.delay_answers(0.3)
+        client.sendall(request(1, 1, b"\x03\x21\x03\x00\x01"))
+        assert answer(client) == (1, 1, b"\x83\x0b")
+        seen(lambda: bus.stats().answers > 0)
+        client.sendall(request(2, 1, b"\x03\x63\x00\x00\x7e"))
+        assert answer(client) == (2, 1, b"\x83\x03")
+    assert gateway.stats.late == 1
+
+
+def test_of_seventeen_from_one_host_one_gives_way(gateway: Gateway) -> None:
+    clients = [connected(gateway) for _ in range(16)]
+    for client in clients[1:]:
+        client.sendall(request(1, 1, b"\x03\x21\x03\x00\x01"))
+        assert answer(client)[2] == b"\x03\x02\x01\xa0"
+    with connected(gateway) as more:
+        more.sendall(request(2, 1, b"\x03\x21\x03\x00\x01"))
+        assert answer(more)[2] == b"\x03\x02\x01\xa0"
+        assert is_cut_off(clients[0])
+        assert (gateway.stats.clients, gateway.stats.gave_way) == (16, 1)
+    for client in clients:
+        client.close()
+
+
+def test_where_the_bus_is_closed_the_path_is_away() -> None:
+    bus = Bus("sim://gd350?clock=virtual")
+    with Gateway(bus, HERE) as gateway, connected(gateway) as client:
+        bus.close()
+        client.sendall(request(1, 1, b"\x03\x21\x03\x00\x01"))
+        assert answer(client) == (1, 1, b"\x83\x0a")
+
+
+def test_closing_ends_all_and_frees_the_address(bus: Bus) -> None:
+    with Gateway(bus, HERE) as gateway, connected(gateway) as client:
+        address = gateway.address
+        gateway.close()
+        assert is_cut_off(client)
+    with Gateway(bus, address) as again:
+        assert again.address == address
+
+
+@NO_PTY
+def test_the_command_shares_a_line_and_tells_what_it_refused() -> None:
+    words = [sys.executable, "-m", "drivebus", "--json", "share", "sim://gd350", "--tcp", HERE]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        assert program.stderr is not None
+        host, port = json.loads(program.stdout.readline())["address"].rsplit(":", 1)
+        with socket.create_connection((host, int(port)), timeout=20) as client:
+            client.sendall(request(1, 1, b"\x03\x21\x03\x00\x01") + request(2, 1, b"\x06\x20\x00\x00\x01"))
+            assert {answer(client), answer(client)} == {(1, 1, b"\x03\x02\x01\xa0"), (2, 1, b"\x86\x01")}
+            assert "may only read units 1 to 247, and asked unit 1: 06 20 00 00 01" in program.stderr.readline()
+        program.send_signal(signal.SIGINT)
+        counts = json.loads(program.stdout.readline())
+        assert program.wait() == 0
+    assert (counts["requests"], counts["answered"], counts["refused"]) == (2, 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("open_wrong", "kind", "said"),
+    [
+        (lambda bus: Gateway(bus, "1502"), drivebus.BadArgument, "has to be host:port"),
+        (lambda bus: Gateway(bus, "localhost:70000"), drivebus.BadArgument, "has to be host:port"),
+        (lambda bus: Gateway(bus, cast(str, 5)), drivebus.BadArgument, "has to be host:port"),
+        (lambda bus: Gateway(bus, HERE, answer_within=0.0), drivebus.BadArgument, "answer_within"),
+        (lambda _: Gateway(cast(Bus, "COM3"), HERE), drivebus.BadArgument, "drivebus.Bus"),
+        (lambda bus: Gateway(bus, "192.0.2.1:1502"), drivebus.PortError, "nothing can listen there"),
+    ],
+)
+def test_what_cannot_be_listens_nowhere(
+    bus: Bus, open_wrong: Callable[[Any], object], kind: type[Exception], said: str
+) -> None:
+    with pytest.raises(kind, match=said):
+        open_wrong(bus)
+
+
+def test_an_address_that_is_taken(gateway: Gateway, bus: Bus) -> None:
+    with pytest.raises(drivebus.PortError, match=gateway.address):
+        Gateway(bus, gateway.address)
