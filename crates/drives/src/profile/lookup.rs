@@ -35,6 +35,16 @@ pub enum NameError {
         /// The name as given.
         name: String,
     },
+    /// The number behind the point lacks a digit: a spreadsheet makes `P00.1` of `P00.10`.
+    #[error("\"{name}\" may be {one} or {other}; write both digits")]
+    Unclear {
+        /// The name as given.
+        name: String,
+        /// The parameter whose number begins with 0.
+        one: String,
+        /// The one whose number ends with 0.
+        other: String,
+    },
     /// The address is one that says where a written parameter is kept.
     #[error("{address:04X}H only writes {name}, and says where it is kept; name it {name}")]
     WriteForm {
@@ -71,6 +81,21 @@ fn numbered_from_40001(name: &str) -> Option<u16> {
     u16::try_from(number.checked_sub(first)?).ok()
 }
 
+/// Whether `wanted` has fewer digits behind its point than `code`, and could be another number with all of them.
+fn lacks_a_digit(wanted: &str, code: &str) -> bool {
+    let digits = |text: &str| text.bytes().rev().take_while(u8::is_ascii_digit).count();
+    digits(wanted) < digits(code) && !wanted.ends_with('0')
+}
+
+fn unclear(name: &str, group: u8, index: u8) -> NameError {
+    let other = u16::from(index) * 10;
+    NameError::Unclear {
+        name: name.to_owned(),
+        one: format!("P{group:02}.{index:02}"),
+        other: format!("P{group:02}.{other}"),
+    }
+}
+
 impl Profile {
     /// The entry that is written at `place`: where that is a command and a read tells a state, the command.
     pub fn written_entry_at(&self, place: impl Into<Place>) -> Option<&Entry> {
@@ -87,7 +112,8 @@ impl Profile {
     ///
     /// # Errors
     ///
-    /// [`NameError`]: there is no such entry (the closest is named), or it is closed, or the address only writes.
+    /// [`NameError`]: there is no such entry (the closest is named), or it is closed, or the address only writes; or the code
+    /// lacks a digit, and may be another.
     pub fn find(&self, name: &str) -> Result<&Entry, NameError> {
         let wanted = name.trim();
         let called = |name: &str| name.eq_ignore_ascii_case(wanted);
@@ -100,7 +126,8 @@ impl Profile {
                 return Err(NameError::Closed { profile: self.name().to_owned(), name: name.to_owned() });
             }
             if let Some(entry) = self.numbered(group, index) {
-                return Ok(entry);
+                let code = entry.code().unwrap_or_default();
+                return if lacks_a_digit(wanted, code) { Err(unclear(name, group, index)) } else { Ok(entry) };
             }
         }
         if let Some(address) = parse_address(wanted) {
@@ -113,7 +140,7 @@ impl Profile {
         })
     }
 
-    /// The parameter whose code has these numbers: `P0.1` is P00.01. What is at the address that others have for it says
+    /// The parameter whose code has these numbers: of 0 and 1, P00.01. What is at the address that others have for it says
     /// nothing where codes tell no addresses.
     fn numbered(&self, group: u8, index: u8) -> Option<&Entry> {
         self.entries().find(|entry| entry.code().and_then(parse_code) == Some((group, index)))

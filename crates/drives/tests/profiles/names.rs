@@ -23,6 +23,17 @@ fn registers_codes_and_addresses_are_found() {
     }
 }
 
+/// A spreadsheet takes P00.10 for a number, and drops the 0.
+#[test]
+fn a_code_that_lacks_a_digit_stands_for_none() {
+    let profile = Profile::builtin("gd350").unwrap();
+    for name in ["P00.1", "p0.1", "P00-1", "P00,1", "r00.1"] {
+        assert!(matches!(profile.find(name), Err(NameError::Unclear { .. })), "{name}");
+    }
+    assert_eq!(profile.find("P00.1").unwrap_err().to_string(), "\"P00.1\" may be P00.01 or P00.10; write both digits");
+    assert_eq!(profile.find("P4.0").unwrap().name(), profile.find("P04.00").unwrap().name());
+}
+
 #[test]
 fn what_is_not_found_is_explained() {
     let profile = Profile::builtin("gd350").unwrap();
