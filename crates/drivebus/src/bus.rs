@@ -237,6 +237,17 @@ impl Bus {
         Ok(self.core.link(checks::unit(unit)?))
     }
 
+    /// A number that is another one each time `unit` is told to halt over this line, by whichever program: by an
+    /// [urgent](CallOptions::urgent) write. For [`CallOptions::halts`]. Where another program has the port, it is asked, a
+    /// second at most.
+    ///
+    /// # Errors
+    ///
+    /// [`NotAllowed`](crate::ErrorKind::NotAllowed): no such unit.
+    pub fn halts(&self, unit: u8) -> Result<u64, Error> {
+        Ok(self.core.halts(checks::unit(unit)?))
+    }
+
     /// Counters and latencies since the bus was opened, for the line and for each unit.
     pub fn stats(&self) -> Stats {
         self.core.stats()

@@ -27,6 +27,7 @@ pub struct CallOptions {
     verify: bool,
     read_back: Option<u16>,
     connection: Option<u64>,
+    halts: Option<u64>,
 }
 
 impl CallOptions {
@@ -35,7 +36,9 @@ impl CallOptions {
         Self::default()
     }
 
-    /// The longest wait for the answer.
+    /// The longest wait for the answer to each request. A call may take longer: after an answer was lost, the unit is asked for
+    /// an echo, or for another number of words, before anything is asked again, so that a late answer is never taken for
+    /// the new one.
     #[must_use]
     pub fn timeout(self, timeout: Duration) -> Self {
         Self { timeout: Some(timeout), ..self }
@@ -79,12 +82,31 @@ impl CallOptions {
         Self { connection: Some(reconnects), ..self }
     }
 
+    /// Sends nothing where the unit was told to halt since you decided on this call, by any [urgent](Self::urgent) write over
+    /// this line, of this program or another: `halts` is [`Bus::halts`](crate::Bus::halts) of that moment. Without it, a start
+    /// that waits for its turn goes out behind a stop that overtakes it.
+    ///
+    /// ```
+    /// use drivebus::{Bus, CallOptions};
+    ///
+    /// let bus = Bus::open("sim://gd350?clock=virtual")?;
+    /// let decided = bus.halts(1)?;
+    /// bus.write_with(1, 0x2000, 5, CallOptions::new().urgent())?; // somebody stops it
+    /// let start = bus.write_with(1, 0x2000, 1, CallOptions::new().halts(decided));
+    /// assert!(!start.unwrap_err().may_have_acted());
+    /// # Ok::<(), drivebus::Error>(())
+    /// ```
+    #[must_use]
+    pub fn halts(self, halts: u64) -> Self {
+        Self { halts: Some(halts), ..self }
+    }
+
     /// As the line takes it, for `request`.
     pub(crate) fn of(self, request: &Request<'_>) -> Result<LineOptions, Error> {
         self.timeout.map_or(Ok(()), checks::timeout)?;
         self.retries.map_or(Ok(()), |retries| checks::within("retries", retries, 0, 100))?;
         let options = LineOptions::new().timeout(self.timeout).retries(self.retries).verify(self.verify);
-        let options = options.read_back(self.read_back).connection(self.connection);
+        let options = options.read_back(self.read_back).connection(self.connection).halts(self.halts);
         Ok(if self.urgent { options.urgent(request) } else { options })
     }
 }

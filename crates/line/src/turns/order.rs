@@ -23,8 +23,8 @@ const CLASSES: usize = 3;
 /// Who goes first among those who wait for the line.
 ///
 /// Stops go in the order they came. Within each other class the programs that share the line take turns, of each its units
-/// do, and the calls for one unit go in the order they came. Who waits while calls of a higher class that came later go first 32 times goes before them then, and
-/// of several such the one that came first.
+/// do, and the calls for one unit go in the order they came. Who waits while calls of a higher class that came later go
+/// first 32 times goes before them then, and of several such the one that came first; but before a stop nobody goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 #[non_exhaustive]
 pub enum Priority {
