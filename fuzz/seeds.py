@@ -372,6 +372,25 @@ def drives() -> dict[str, bytes]:
     }
 
 
+def clients() -> dict[str, bytes]:
+    """For `gateway`: the length of the pieces less one, then what a client of Modbus TCP sends."""
+
+    def asked(number: int, unit: int, pdu: bytes) -> bytes:
+        return number.to_bytes(2, "big") + bytes([0, 0, 0, 1 + len(pdu), unit]) + pdu
+
+    read, write = bytes([3, 0x21, 3, 0, 1]), bytes([6, 0x20, 0, 0, 1])
+    return {
+        "one": b"\xff" + asked(1, 1, read),
+        "by-the-byte": b"\0" + asked(1, 1, read) + asked(2, 2, write),
+        "longest": b"\x40" + asked(0xFFFF, 255, bytes([0x10]) + bytes(252)) + asked(1, 1, read),
+        "half": b"\xff" + asked(1, 1, read)[:-1],
+        "no-body": b"\xff" + bytes([0, 1, 0, 0, 0, 1, 1]),
+        "too-long": b"\xff" + bytes([0, 1, 0, 0, 0, 255]) + bytes(255),
+        "http": b"\xff" + b"GET / HTTP/1.1\r\n\r\n",
+        "tls-behind-one": b"\x0b" + asked(1, 1, read) + bytes.fromhex("16030102000100"),
+    }
+
+
 def main() -> None:
     """The command."""
     listened = streams()
@@ -389,6 +408,7 @@ def main() -> None:
         "drive": drives(),
         "frame": frames(),
         "framer": framer,
+        "gateway": clients(),
         "guest": guests(),
         "listener": listened,
         "master": masters(),

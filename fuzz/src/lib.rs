@@ -10,6 +10,7 @@ mod conversation;
 mod doubts;
 mod frame;
 mod framer;
+mod gateway;
 mod guest;
 mod listener;
 mod master;
@@ -24,6 +25,7 @@ pub use bus::bus;
 pub use conversation::conversation;
 pub use frame::frame;
 pub use framer::framer;
+pub use gateway::gateway;
 pub use guest::guest;
 pub use listener::listener;
 pub use master::master;
@@ -35,7 +37,7 @@ pub use sniffer::sniffer;
 pub type Target = fn(&[u8]);
 
 /// Every target by the name of its corpus and of its program.
-pub const TARGETS: [(&str, Target); 10] = [
+pub const TARGETS: [(&str, Target); 11] = [
     ("frame", frame),
     ("framer", framer),
     ("listener", listener),
@@ -45,5 +47,6 @@ pub const TARGETS: [(&str, Target); 10] = [
     ("bus", bus),
     ("conversation", conversation),
     ("guest", guest),
+    ("gateway", gateway),
     ("sniffer", sniffer),
 ];
