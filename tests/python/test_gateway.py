@@ -25,10 +25,10 @@ import drivebus
 from drivebus import Bus, Gateway, Simulator
 
 from .conftest import NO_PTY
+from .tcp_client import HERE, answer, connected, is_cut_off, request
 
 IS = 0x01A0
 """What a GD350 answers at 2103H."""
-HERE = "127.0.0.1:0"
 
 
 @pytest.fixture(scope="module")
@@ -49,44 +49,12 @@ def gateway(bus: Bus) -> Iterator[Gateway]:
         yield gateway
 
 
-def connected(gateway: Gateway) -> socket.socket:
-    host, port = gateway.address.rsplit(":", 1)
-    return socket.create_connection((host, int(port)), timeout=20)
-
-
-def request(transaction: int, unit: int, pdu: bytes) -> bytes:
-    return struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu
-
-
-def exactly(client: socket.socket, count: int) -> bytes:
-    came = b""
-    while len(came) < count:
-        piece = client.recv(count - len(came))
-        if not piece:
-            raise EOFError(came)
-        came += piece
-    return came
-
-
-def answer(client: socket.socket) -> tuple[int, int, bytes]:
-    transaction, protocol, length, unit = struct.unpack(">HHHB", exactly(client, 7))
-    assert protocol == 0
-    return transaction, unit, exactly(client, length - 1)
-
-
 def asked(gateway: Gateway, unit: int, pdu: bytes) -> bytes:
     with connected(gateway) as client:
         client.sendall(request(7, unit, pdu))
         transaction, of, pdu = answer(client)
     assert (transaction, of) == (7, unit)
     return pdu
-
-
-def is_cut_off(client: socket.socket) -> bool:
-    try:
-        return client.recv(1) == b""
-    except ConnectionResetError:
-        return True
 
 
 @contextmanager

@@ -119,7 +119,7 @@ class Table:
         }
 
     def in_words(self) -> str:
-        """What is recorded, for whoever opens the file: `drivebus 0.1.0, every 0.5 s: pump (gd350)`."""
+        """What is recorded, for whoever opens the file: `drivebus VERSION, every 0.5 s: pump (gd350)`."""
         rate = "as fast as the line allows" if self._about["interval"] is None else f"every {self._about['interval']} s"
         drives = ", ".join(f"{drive['name']} ({drive['profile']})" for drive in self._about["drives"])
         return f"drivebus {self._about['drivebus']}, {rate}: {drives}"

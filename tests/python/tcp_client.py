@@ -1,0 +1,42 @@
+"""A client of Modbus TCP by the byte: what it sends and hears is what the test says."""
+
+from __future__ import annotations
+
+import socket
+import struct
+
+from drivebus import Gateway
+
+HERE = "127.0.0.1:0"
+
+
+def connected(gateway: Gateway, source: str = "127.0.0.1") -> socket.socket:
+    host, port = gateway.address.rsplit(":", 1)
+    return socket.create_connection((host, int(port)), timeout=20, source_address=(source, 0))
+
+
+def request(transaction: int, unit: int, pdu: bytes) -> bytes:
+    return struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu
+
+
+def exactly(client: socket.socket, count: int) -> bytes:
+    came = b""
+    while len(came) < count:
+        piece = client.recv(count - len(came))
+        if not piece:
+            raise EOFError(came)
+        came += piece
+    return came
+
+
+def answer(client: socket.socket) -> tuple[int, int, bytes]:
+    transaction, protocol, length, unit = struct.unpack(">HHHB", exactly(client, 7))
+    assert protocol == 0
+    return transaction, unit, exactly(client, length - 1)
+
+
+def is_cut_off(client: socket.socket) -> bool:
+    try:
+        return client.recv(1) == b""
+    except ConnectionResetError:
+        return True
