@@ -29,7 +29,7 @@ class GatewayStats(NamedTuple):
         requests: Requests.
         answered: Requests that were answered by what the unit said.
         refused: Requests that are not allowed.
-        failed: Requests that were answered by an exception of this program, or by one of the unit.
+        failed: Requests that were answered by an exception: of the unit, or because the line brought no answer of it.
         late: Requests that were answered by 0BH because their time was up.
         busy: Requests beyond the 16 that one connection may have on their way.
     """

@@ -5,7 +5,9 @@ Clients are pymodbus, and bytes of a socket of this test's own. The line is the 
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import signal
 import socket
 import struct
@@ -245,6 +247,65 @@ def test_closing_ends_all_and_frees_the_address(bus: Bus) -> None:
         assert is_cut_off(client)
     with Gateway(bus, address) as again:
         assert again.address == address
+
+
+@NO_PTY
+def test_a_forked_child_keeps_nothing_open(bus: Bus) -> None:
+    gateway = Gateway(bus, HERE)
+    with connected(gateway) as client:
+        client.sendall(request(1, 1, b"\x03\x21\x03\x00\x01"))
+        assert answer(client) == (1, 1, b"\x03\x02\x01\xa0")
+        until_then, go = os.pipe()
+        child = os.fork()
+        if not child:
+            os.close(go)
+            os.read(until_then, 1)
+            gateway.close()
+            os._exit(0)
+        os.close(until_then)
+        try:
+            gateway.close()
+            assert is_cut_off(client)
+            with pytest.raises(ConnectionRefusedError):
+                connected(gateway)
+            with Gateway(bus, gateway.address) as again, connected(again) as other:
+                os.close(go)
+                os.waitpid(child, 0)
+                other.sendall(request(2, 1, b"\x03\x21\x03\x00\x01"))
+                assert answer(other) == (2, 1, b"\x03\x02\x01\xa0")
+        finally:
+            with contextlib.suppress(OSError):
+                os.close(go)
+
+
+def send_for_ever(client: socket.socket, asks: bytes) -> None:
+    while True:
+        client.sendall(asks)
+
+
+def test_one_that_takes_no_answers_is_cut_off(gateway: Gateway) -> None:
+    host, port = gateway.address.rsplit(":", 1)
+    asks = b"".join(request(number, 1, b"\x03\x30\x00\x00\x10") for number in range(1000))
+    with socket.socket() as client:
+        # So that little stands between the two.
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.connect((host, int(port)))
+        with pytest.raises((ConnectionResetError, BrokenPipeError)):
+            send_for_ever(client, asks)
+    assert "an answer that was not taken within 1 s" in gateway.told()[-1]
+
+
+def test_a_thousand_connections_leave_the_last_ones_and_the_line(gateway: Gateway, bus: Bus) -> None:
+    clients = [connected(gateway, f"127.0.0.{2 + number % 8}") for number in range(1000)]
+    last = clients[-1]
+    last.sendall(request(1, 1, b"\x03\x21\x03\x00\x01"))
+    assert answer(last) == (1, 1, b"\x03\x02\x01\xa0")
+    assert bus.read(1, 0x2103) == [IS]
+    seen(lambda: gateway.stats.let_in == 1000)
+    seen(lambda: gateway.stats.clients == 64)
+    assert gateway.stats.gave_way == 936
+    for client in clients:
+        client.close()
 
 
 @NO_PTY

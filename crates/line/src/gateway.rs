@@ -26,8 +26,8 @@ mod rights;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Weak};
-use std::thread;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 pub use counts::GatewayStats;
@@ -38,6 +38,8 @@ use crate::gateway::clients::Clients;
 use crate::gateway::connection::Connection;
 use crate::gateway::counts::Counts;
 use crate::system::clock::{LOOK_UP, monotonic};
+use crate::system::inherited::Kept;
+use crate::system::process::Process;
 
 /// How long an answer may take, where nothing else is said.
 pub const ANSWER_WITHIN: Duration = Duration::from_secs(1);
@@ -62,6 +64,9 @@ pub struct Gateway {
     clients: Arc<Clients>,
     counts: Arc<Counts>,
     is_closed: Arc<AtomicBool>,
+    opened_by: Process,
+    /// The thread at the door, until it is told to end.
+    door: Mutex<Option<JoinHandle<()>>>,
 }
 
 impl Gateway {
@@ -73,12 +78,14 @@ impl Gateway {
     /// The system's: the address is not one of this machine, is taken, or may not be listened at.
     pub fn open(bus: &Arc<Bus>, address: &str, within: Duration) -> io::Result<Self> {
         let addresses: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
-        let listener = TcpListener::bind(&addresses[..])?;
+        let listener = Kept::new(TcpListener::bind(&addresses[..])?);
         let gateway = Self {
             address: listener.local_addr()?,
             clients: Arc::default(),
             counts: Arc::default(),
             is_closed: Arc::default(),
+            opened_by: Process::current(),
+            door: Mutex::default(),
         };
         let door = Door {
             bus: Arc::downgrade(bus),
@@ -87,7 +94,9 @@ impl Gateway {
             counts: Arc::clone(&gateway.counts),
             is_closed: Arc::clone(&gateway.is_closed),
         };
-        thread::Builder::new().name("drivebus-tcp-door".to_owned()).spawn(move || door.stand(&listener))?;
+        let standing =
+            thread::Builder::new().name("drivebus-tcp-door".to_owned()).spawn(move || door.stand(&listener))?;
+        *gateway.door.lock().unwrap_or_else(PoisonError::into_inner) = Some(standing);
         Ok(gateway)
     }
 
@@ -108,10 +117,17 @@ impl Gateway {
 
     /// Ends all connections, and listens no more. What clients asked and is not sent is taken back. Closing again does nothing.
     pub fn close(&self) {
-        if !self.is_closed.swap(true, Ordering::AcqRel) {
+        // In a forked child none of it is there.
+        if self.opened_by.is_current() && !self.is_closed.swap(true, Ordering::AcqRel) {
             self.clients.close();
-            // Wakes the thread at the door. Where nobody can connect, nobody has to be kept out.
-            let _ = TcpStream::connect_timeout(&reachable(self.address), TO_END);
+            let standing = self.door.lock().unwrap_or_else(PoisonError::into_inner).take();
+            // It is woken by somebody who knocks. Where nobody can, nobody has to be kept out, and it is left to stand.
+            if TcpStream::connect_timeout(&reachable(self.address), TO_END).is_ok()
+                && let Some(standing) = standing
+            {
+                // One that panicked stands there no more either.
+                let _ = standing.join();
+            }
         }
     }
 }
@@ -161,8 +177,8 @@ impl Door {
         let Some(bus) = self.bus.upgrade() else { return Ok(()) };
         let seat = bus.seat();
         drop(bus);
-        let host = peer.ip().to_canonical();
-        let Some((place, gone)) = self.clients.enter(stream.try_clone()?, host, monotonic()) else { return Ok(()) };
+        let (stream, host) = (Arc::new(Kept::new(stream)), peer.ip().to_canonical());
+        let Some((place, gone)) = self.clients.enter(Arc::clone(&stream), host, monotonic()) else { return Ok(()) };
         if gone.is_some() {
             self.counts.gave_way(peer);
         }

@@ -5,6 +5,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use drivebus_rtu::Instant;
 
+use crate::system::inherited::Kept;
+
+/// A connection that a forked child does not keep open.
+pub(super) type Stream = Arc<Kept<TcpStream>>;
+
 /// Connections at a time, of all and of one host.
 pub(super) const MOST: usize = 64;
 pub(super) const MOST_OF_ONE: usize = 16;
@@ -16,7 +21,7 @@ struct Client {
     host: IpAddr,
     /// When it asked last, or came.
     asked: Instant,
-    stream: TcpStream,
+    stream: Stream,
 }
 
 /// Who is connected.
@@ -41,7 +46,7 @@ impl Clients {
     /// host is told; `None`: nobody comes in any more.
     pub(super) fn enter(
         self: &Arc<Self>,
-        stream: TcpStream,
+        stream: Stream,
         host: IpAddr,
         now: Instant,
     ) -> Option<(Place, Option<IpAddr>)> {

@@ -12,7 +12,7 @@ use crate::bus::Bus;
 use crate::bus::errand::Errand;
 use crate::bus::programs::Seat;
 use crate::bus::workers::Running;
-use crate::gateway::clients::Place;
+use crate::gateway::clients::{Place, Stream};
 use crate::gateway::counts::Counts;
 use crate::gateway::desk::{Desk, code_of, refused};
 use crate::gateway::mailbox::{Found, Mail, Mailbox};
@@ -27,6 +27,9 @@ pub(super) const IN_FLIGHT: usize = 16;
 const HURRY: Duration = Duration::from_secs(1);
 /// How long a connection stays open that asks nothing.
 const IDLE: Duration = Duration::from_secs(60);
+/// Bytes of answers that the system keeps for a client which does not read: more than those of all its requests on their way.
+#[cfg(unix)]
+const UNREAD: usize = 16_384;
 /// What is read at a time.
 const CHUNK: usize = 4_096;
 
@@ -45,15 +48,17 @@ pub(super) struct Connection {
 /// # Errors
 ///
 /// The system's: it gives no thread, or no second handle of the stream.
-pub(super) fn serve(connection: Connection, stream: TcpStream) -> std::io::Result<()> {
+pub(super) fn serve(connection: Connection, stream: Stream) -> std::io::Result<()> {
     // An answer is one small message, and its client waits for it.
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(HURRY))?;
+    #[cfg(unix)]
+    rustix::net::sockopt::set_socket_send_buffer_size(&**stream, UNREAD)?;
     let mailbox = Arc::new(Mailbox::default());
-    let reader = stream.try_clone()?;
+    let reader = Arc::clone(&stream);
     let letters = Arc::clone(&mailbox);
     std::thread::Builder::new().name("drivebus-tcp-in".to_owned()).spawn(move || {
-        let why = read(reader, &letters);
+        let why = read(&reader, &letters);
         letters.end(why);
     })?;
     let letters = Arc::clone(&mailbox);
@@ -72,7 +77,7 @@ pub(super) fn serve(connection: Connection, stream: TcpStream) -> std::io::Resul
 }
 
 /// Reads requests until the connection ends; why it does, for people, empty where the client ended it.
-fn read(mut stream: TcpStream, mailbox: &Mailbox) -> String {
+fn read(stream: &TcpStream, mailbox: &Mailbox) -> String {
     let mut requests = Requests::default();
     let mut bytes = [0; CHUNK];
     // When what is there began: the request that is not whole, or the time without one.
@@ -80,8 +85,7 @@ fn read(mut stream: TcpStream, mailbox: &Mailbox) -> String {
     loop {
         let limit = if requests.has_begun() { HURRY } else { IDLE };
         let left = (since + limit).saturating_duration_since(monotonic());
-        let came =
-            if left.is_zero() { Err(ErrorKind::TimedOut.into()) } else { read_within(&mut stream, left, &mut bytes) };
+        let came = if left.is_zero() { Err(ErrorKind::TimedOut.into()) } else { read_within(stream, left, &mut bytes) };
         match came {
             Ok(0) => return String::new(),
             Ok(count) => {
@@ -100,7 +104,8 @@ fn read(mut stream: TcpStream, mailbox: &Mailbox) -> String {
                     return String::new();
                 }
                 if asked_any || !had_begun {
-                    since = now;
+                    // From when this is read on: what the client had to wait for room is not its delay.
+                    since = monotonic();
                 }
             }
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
@@ -119,7 +124,7 @@ fn read(mut stream: TcpStream, mailbox: &Mailbox) -> String {
     }
 }
 
-fn read_within(stream: &mut TcpStream, left: Duration, bytes: &mut [u8]) -> std::io::Result<usize> {
+fn read_within(mut stream: &TcpStream, left: Duration, bytes: &mut [u8]) -> std::io::Result<usize> {
     // The system takes no time-out below its own grain.
     stream.set_read_timeout(Some(left.max(Duration::from_millis(1))))?;
     stream.read(bytes)

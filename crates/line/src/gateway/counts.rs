@@ -29,7 +29,7 @@ pub struct GatewayStats {
     pub answered: u64,
     /// Requests that are not allowed.
     pub refused: u64,
-    /// Requests that were answered by an exception of this program: nobody answered, or the port is away.
+    /// Requests that were answered by an exception: of the unit, or because the line brought no answer of it.
     pub failed: u64,
     /// Requests that were answered by 0BH because their time was up.
     pub late: u64,
