@@ -85,6 +85,14 @@ SECTIONS = [
         module("many_lines"),
     ),
     Section(
+        "gateway",
+        "Modbus TCP through a gateway",
+        "One unit as in the first table. The bus itself, one client of Modbus TCP that asks when it has heard, and "
+        "four clients with four requests each, in turns: the share of the shortest cycle, and what a read of the one "
+        "client takes more than one of the bus.",
+        module("gateway"),
+    ),
+    Section(
         "aio_loop",
         "Many lines in one event loop",
         "The same lines, read by tasks of one asyncio loop. A tick is how much later than asked a task wakes up that "
