@@ -20,6 +20,7 @@ __all__ = [
     "Asked",
     "Batch",
     "Bus",
+    "Gateway",
     "Mailbox",
     "Plan",
     "Poller",
