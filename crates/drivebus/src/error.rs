@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use drivebus_drives::{AccessError, NameError, ProfileError};
+use drivebus_drives::{AccessError, NameError, ProfileError, ValueError};
 use drivebus_line::url::{UnitError, UrlError};
 use drivebus_line::{CallError, ErrorKind, Failure, PollError, WordError};
 use drivebus_rtu::{RequestError, SerialFormatError};
@@ -119,6 +119,16 @@ macro_rules! not_allowed {
     };
 }
 
-not_allowed!(AccessError, NameError, ProfileError, RequestError, SerialFormatError, UnitError, UrlError, WordError);
+not_allowed!(
+    AccessError,
+    NameError,
+    ProfileError,
+    RequestError,
+    SerialFormatError,
+    UnitError,
+    UrlError,
+    ValueError,
+    WordError
+);
 #[cfg(feature = "sim")]
 not_allowed!(drivebus_sim::SimError);
