@@ -32,6 +32,7 @@ class GatewayStats(NamedTuple):
         failed: Requests that were answered by an exception: of the unit, or because the line brought no answer of it.
         late: Requests that were answered by 0BH because their time was up.
         busy: Requests beyond the 16 that one connection may have on their way.
+        together: Requests that were answered by the read that another one began.
     """
 
     clients: int
@@ -44,6 +45,7 @@ class GatewayStats(NamedTuple):
     failed: int
     late: int
     busy: int
+    together: int
 
 
 @known_only
@@ -54,7 +56,8 @@ class Gateway:
             gateway.wait()
 
     Each connection waits for the line like a program of its own, so that none keeps the others from it, and a stop goes
-    before them all. Each answer belongs to its request, as for a program that uses the bus.
+    before them all. Each answer belongs to its request, as for a program that uses the bus. Identical reads that wait
+    are asked once: nothing older than its request is handed out.
 
     Only reads of the units 1 to 247 are carried out: 01H to 04H. Everything else is refused by 01H, and nothing of it
     is sent. 0AH: the port is away. 0BH: the unit did not answer within *answer_within*; what was not sent by then is

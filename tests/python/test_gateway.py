@@ -193,13 +193,40 @@ def test_what_is_not_sent_when_its_client_hangs_up_is_never_sent() -> None:
     ):
         client.sendall(request(0, 9, b"\x03\x21\x03\x00\x01"))
         seen(lambda: simulator.line.requests == 1)
-        client.sendall(b"".join(request(n, 1, b"\x03\x21\x03\x00\x01") for n in range(1, 16)))
+        client.sendall(b"".join(request(n, 1, bytes([3, 0x30, n, 0, 1])) for n in range(1, 16)))
         seen(lambda: gateway.stats.requests == 16)
         client.close()
         seen(lambda: gateway.stats.clients == 0)
         assert bus.read(1, 0x2103) == [IS]
         # The one to unit 9, and this program's.
         assert simulator.line.requests == 2
+
+
+def test_the_same_reads_that_wait_are_asked_once() -> None:
+    """One is on the wire, to a unit that does not answer; behind it three ask the same, and one something else."""
+    same, other = b"\x03\x21\x03\x00\x01", b"\x03\x30\x02\x00\x01"
+    with contextlib.ExitStack() as stack:
+        simulator = stack.enter_context(Simulator({1: "gd350"}, transport="process"))
+        bus = stack.enter_context(Bus(simulator, timeout=1.0, retries=0))
+        gateway = stack.enter_context(Gateway(bus, HERE, answer_within=30.0))
+        first, *clients = [stack.enter_context(connected(gateway)) for _ in range(4)]
+        first.sendall(request(0, 9, same))
+        seen(lambda: simulator.line.requests == 1)
+        for client in clients:
+            client.sendall(b"".join(request(number, 1, same) for number in range(4)))
+        clients[0].sendall(request(9, 1, other))
+        seen(lambda: gateway.stats.requests == 14)
+        # One of those who wait for the same hangs up: the others are answered nevertheless.
+        clients.pop().close()
+        seen(lambda: gateway.stats.clients == 3)
+        assert answer(first) == (0, 9, b"\x83\x0b")
+        for place, client in enumerate(clients):
+            expected = {(number, 1, b"\x03\x02\x01\xa0") for number in range(4)}
+            came = {answer(client) for _ in range(4 if place else 5)}
+            assert {each for each in came if each[0] != 9} == expected
+        read = [frame[1:6] for _, who, frame in simulator.line.trace() if who == "master" and frame[0] == 1]
+        assert read == [same, other]
+        assert gateway.stats.together == 7
 
 
 def test_an_answer_that_is_late_never_comes() -> None:
@@ -346,3 +373,19 @@ def test_what_cannot_be_listens_nowhere(
 def test_an_address_that_is_taken(gateway: Gateway, bus: Bus) -> None:
     with pytest.raises(drivebus.PortError, match=gateway.address):
         Gateway(bus, gateway.address)
+
+
+@NO_PTY
+def test_through_a_program_that_has_the_port_it_is_the_same() -> None:
+    """The bus of the gateway is a guest of another one; when that ends, it has the port itself."""
+    with Simulator({1: "gd350"}, transport="pty") as simulator, Bus(simulator.port) as owner:
+        assert owner.read(1, 0x2103) == [IS]
+        with Bus(simulator.port) as bus, Gateway(bus, HERE, answer_within=10.0) as gateway:
+            frames = b"".join(request(number, 1, b"\x03\x21\x03\x00\x01") for number in range(16))
+            with connected(gateway) as client:
+                client.sendall(frames)
+                came = {answer(client) for _ in range(16)}
+                assert came == {(number, 1, b"\x03\x02\x01\xa0") for number in range(16)}
+                owner.close()
+                client.sendall(request(99, 1, b"\x03\x21\x03\x00\x01"))
+                assert answer(client) == (99, 1, b"\x03\x02\x01\xa0")

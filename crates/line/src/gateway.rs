@@ -11,6 +11,7 @@
 //! | `desk` | what one of them has asked, and when it has to be answered |
 //! | `clients` | how many there may be, and who gives way |
 //! | `counts` | what happened |
+//! | `together` | reads that wait, and who waits for the same |
 //! | `mailbox`, `connection` | the two threads of each |
 //!
 //! Source: *Modbus Messaging on TCP/IP Implementation Guide* V1.0b, §3.1.3 and §4.4.
@@ -22,6 +23,7 @@ mod desk;
 mod mailbox;
 mod requests;
 mod rights;
+mod together;
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _};
@@ -37,6 +39,7 @@ use crate::bus::Bus;
 use crate::gateway::clients::Clients;
 use crate::gateway::connection::Connection;
 use crate::gateway::counts::Counts;
+use crate::gateway::together::Together;
 use crate::system::clock::{LOOK_UP, monotonic};
 use crate::system::inherited::Kept;
 use crate::system::process::Process;
@@ -92,6 +95,7 @@ impl Gateway {
             within,
             clients: Arc::clone(&gateway.clients),
             counts: Arc::clone(&gateway.counts),
+            together: Arc::default(),
             is_closed: Arc::clone(&gateway.is_closed),
         };
         let standing =
@@ -154,6 +158,7 @@ struct Door {
     within: Duration,
     clients: Arc<Clients>,
     counts: Arc<Counts>,
+    together: Arc<Together>,
     is_closed: Arc<AtomicBool>,
 }
 
@@ -183,8 +188,9 @@ impl Door {
             self.counts.gave_way(peer);
         }
         self.counts.let_in();
-        let counts = Arc::clone(&self.counts);
-        let connection = Connection { bus: Weak::clone(&self.bus), seat, peer, place, within: self.within, counts };
+        let (counts, together) = (Arc::clone(&self.counts), Arc::clone(&self.together));
+        let connection =
+            Connection { bus: Weak::clone(&self.bus), seat, peer, place, within: self.within, counts, together };
         connection::serve(connection, stream)
     }
 }

@@ -54,6 +54,7 @@ impl Gateway {
             ("failed", stats.failed),
             ("late", stats.late),
             ("busy", stats.busy),
+            ("together", stats.together),
         ] {
             all.set_item(name, count)?;
         }

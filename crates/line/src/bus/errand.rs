@@ -28,9 +28,14 @@ pub struct Errand {
     /// Whose it is, of those who use the line through this program.
     pub(super) program: Program,
     pub(super) wanted: Arc<AtomicBool>,
+    /// Asked when its turn has come; taken then.
+    begins: Option<Begins>,
     /// Taken when it is called.
     then: Option<Then>,
 }
+
+/// False: it is not carried out, and nobody is told.
+type Begins = Box<dyn FnOnce() -> bool + Send>;
 
 type Then = Box<dyn FnOnce(Result<Reply, Box<CallError>>) + Send>;
 
@@ -60,8 +65,17 @@ impl Errand {
             _ => None,
         };
         let wanted = Arc::new(AtomicBool::new(true));
-        let then: Option<Then> = Some(Box::new(then));
-        Self { destination, frame, is_fresh_echo: false, answer, options, program: Program::default(), wanted, then }
+        Self {
+            destination,
+            frame,
+            is_fresh_echo: false,
+            answer,
+            options,
+            program: Program::default(),
+            wanted,
+            begins: None,
+            then: Some(Box::new(then)),
+        }
     }
 
     /// It is another program's, which uses the line through this one.
@@ -81,6 +95,24 @@ impl Errand {
         let mut errand = Self::new(destination, &Request::echo(0), options, then);
         errand.is_fresh_echo = true;
         errand
+    }
+
+    /// `begins` is asked when its turn has come, and may say that it is not wanted any more.
+    #[cfg(feature = "tcp")]
+    pub(crate) fn beginning(mut self, begins: impl FnOnce() -> bool + Send + 'static) -> Self {
+        self.begins = Some(Box::new(begins));
+        self
+    }
+
+    /// What tells whether somebody still waits for it.
+    #[cfg(feature = "tcp")]
+    pub(crate) fn wanted(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.wanted)
+    }
+
+    /// Its turn has come; whether it is carried out.
+    pub(super) fn begins(&mut self) -> bool {
+        self.begins.take().is_none_or(|begins| begins())
     }
 
     /// What is asked; an echo carries `fresh`, unless its word was given. Always there: it was made of a request.

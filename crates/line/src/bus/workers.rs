@@ -72,6 +72,9 @@ impl Bus {
 
 /// Asks, in the turn of `errand`, and tells what came of it.
 fn carry_out(mut errand: Errand, bus: &Shared, turn: Turn<'_, Errand>) {
+    if !errand.begins() {
+        return errand.forget();
+    }
     let mut pdu = Vec::new();
     let result = bus.carry_out(&errand, turn, &mut |answer| pdu = pdu_of(errand.destination, &answer));
     let Some(result) = result else { return };

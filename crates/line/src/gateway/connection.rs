@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpStream};
-use std::sync::{Arc, Weak};
+use std::sync::{Arc, OnceLock, Weak};
 use std::time::Duration;
 
 use drivebus_rtu::{ExceptionCode, Instant};
@@ -18,6 +18,7 @@ use crate::gateway::desk::{Desk, code_of, refused};
 use crate::gateway::mailbox::{Found, Mail, Mailbox};
 use crate::gateway::requests::{Asked, Requests};
 use crate::gateway::rights::{Judged, judge};
+use crate::gateway::together::{Asker, Together};
 use crate::options::CallOptions;
 use crate::system::clock::monotonic;
 
@@ -41,6 +42,7 @@ pub(super) struct Connection {
     pub(super) place: Place,
     pub(super) within: Duration,
     pub(super) counts: Arc<Counts>,
+    pub(super) together: Arc<Together>,
 }
 
 /// Serves the other end of `stream` to its end.
@@ -134,7 +136,14 @@ fn read_within(mut stream: &TcpStream, left: Duration, bytes: &mut [u8]) -> std:
 struct Clerk {
     connection: Connection,
     desk: Desk,
-    on_their_way: BTreeMap<u64, Running>,
+    on_their_way: BTreeMap<u64, OnItsWay>,
+}
+
+/// A request on its way to the line.
+struct OnItsWay {
+    asker: Arc<Asker>,
+    /// `None`: it has ended already.
+    running: Option<Running>,
 }
 
 impl Clerk {
@@ -145,16 +154,13 @@ impl Clerk {
                 Found::Over(why) => break why,
                 Found::Nothing => None,
                 Found::Mail(Mail::Asked(asked, at)) => self.ask(&asked, at, mailbox),
-                Found::Mail(Mail::Came(number, result)) => {
-                    self.came(number, result.as_deref().map_err(|error| code_of(error)))
-                }
+                Found::Mail(Mail::Came(number, result)) => self.came(number, result.as_deref().map_err(|&code| code)),
             };
             let late = self.desk.late(monotonic());
             for (number, _) in &late {
                 self.connection.counts.late();
-                // What has not been sent is not sent any more.
-                if let Some(running) = self.on_their_way.remove(number) {
-                    running.abandon();
+                if let Some(way) = self.on_their_way.remove(number) {
+                    self.take_back(&way);
                 }
             }
             let mut all = message.into_iter().chain(late.into_iter().map(|(_, message)| message));
@@ -162,8 +168,8 @@ impl Clerk {
                 break why;
             }
         };
-        for running in self.on_their_way.values() {
-            running.abandon();
+        for way in self.on_their_way.values() {
+            self.take_back(way);
         }
         if !why.is_empty() {
             self.connection.counts.cut_off(self.connection.peer, &why);
@@ -190,14 +196,38 @@ impl Clerk {
             self.connection.counts.busy();
             return Some(refused(asked, ExceptionCode::BUSY));
         };
-        let letters = Arc::clone(mailbox);
+        let (together, counts) = (Arc::clone(&self.connection.together), Arc::clone(&self.connection.counts));
+        let itself = together.wait((asked.unit, asked.pdu.clone()), Arc::clone(mailbox), number);
+        // Who gets what this one reads, from when it has begun.
+        let others: Arc<OnceLock<Vec<Arc<Asker>>>> = Arc::default();
+        let (who, told, waiting) = (Arc::clone(&itself), Arc::clone(&others), Arc::clone(&together));
         let errand = Errand::new(destination, &request, CallOptions::new(), move |result| {
-            letters.come(number, result.map(|reply| reply.pdu));
+            let answered = result.map(|reply| reply.pdu).map_err(|error| code_of(&error));
+            match told.get() {
+                Some(askers) => askers.iter().for_each(|one| one.hear(answered.clone())),
+                // It ended before its turn came.
+                None if waiting.take_back(&who) => who.hear(answered),
+                None => {}
+            }
         });
-        if let Some(running) = bus.send(errand.of_program(self.connection.seat.program)) {
-            self.on_their_way.insert(number, running);
-        }
+        let (who, wanted) = (Arc::clone(&itself), errand.wanted());
+        let errand = errand.of_program(self.connection.seat.program).beginning(move || {
+            let askers = together.begin(&who, &wanted);
+            counts.together(askers.len());
+            !askers.is_empty() && others.set(askers).is_ok()
+        });
+        let running = bus.send(errand);
+        self.on_their_way.insert(number, OnItsWay { asker: itself, running });
         None
+    }
+
+    /// What has not been sent is not sent any more.
+    fn take_back(&self, way: &OnItsWay) {
+        if self.connection.together.take_back(&way.asker)
+            && let Some(running) = &way.running
+        {
+            running.abandon();
+        }
     }
 
     /// The answer by what came; none where the client was answered before.

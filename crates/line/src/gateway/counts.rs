@@ -35,6 +35,8 @@ pub struct GatewayStats {
     pub late: u64,
     /// Requests beyond those that one connection may have on their way.
     pub busy: u64,
+    /// Requests that were answered by the read that another one began.
+    pub together: u64,
 }
 
 /// The same, while it happens.
@@ -49,6 +51,7 @@ pub(super) struct Counts {
     failed: AtomicU64,
     late: AtomicU64,
     busy: AtomicU64,
+    together: AtomicU64,
     told: Mutex<VecDeque<String>>,
 }
 
@@ -94,6 +97,11 @@ impl Counts {
         count(&self.busy);
     }
 
+    /// One read begins for so many requests.
+    pub(super) fn together(&self, askers: usize) {
+        self.together.fetch_add(askers.saturating_sub(1) as u64, Ordering::Relaxed);
+    }
+
     pub(super) fn tell(&self, words: String) {
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
         if told.len() == KEPT {
@@ -119,6 +127,7 @@ impl Counts {
             failed: of(&self.failed),
             late: of(&self.late),
             busy: of(&self.busy),
+            together: of(&self.together),
         }
     }
 }

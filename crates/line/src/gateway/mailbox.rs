@@ -3,14 +3,16 @@
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-use drivebus_rtu::Instant;
+use drivebus_rtu::{ExceptionCode, Instant};
 
-use crate::error::CallError;
 use crate::gateway::requests::Asked;
 use crate::system::clock::monotonic;
 
 /// Requests that a reader may have read beyond those that the desk has taken: then it reads no more.
 const AHEAD: usize = 64;
+
+/// What came of a request: the PDU of its answer, or the exception that says why there is none.
+pub(super) type Answered = Result<Vec<u8>, ExceptionCode>;
 
 /// One thing that the desk is told.
 #[derive(Debug)]
@@ -18,7 +20,7 @@ pub(super) enum Mail {
     /// The client asks, since that moment.
     Asked(Asked, Instant),
     /// What came of a request.
-    Came(u64, Result<Vec<u8>, Box<CallError>>),
+    Came(u64, Answered),
 }
 
 /// The mailbox of one desk.
@@ -67,8 +69,8 @@ impl Mailbox {
     }
 
     /// Leaves what came of request `number`. Nobody is waited for: as many come as are on their way.
-    pub(super) fn come(&self, number: u64, result: Result<Vec<u8>, Box<CallError>>) {
-        self.lock().mail.push_back(Mail::Came(number, result));
+    pub(super) fn come(&self, number: u64, answered: Answered) {
+        self.lock().mail.push_back(Mail::Came(number, answered));
         self.changed.notify_all();
     }
 
