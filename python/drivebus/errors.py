@@ -53,6 +53,9 @@ class Details(TypedDict, total=False):
     ended: float | None
 
 
+_READS = (0x01, 0x02, 0x03, 0x04)
+
+
 class DrivebusError(Exception):
     """The base of all errors here.
 
@@ -94,7 +97,10 @@ class DrivebusError(Exception):
     @property
     def may_have_taken(self) -> bool:
         """Whether a drive may have taken what was asked of it. False: it surely has not, and it may be asked again."""
-        return True
+        if not isinstance(self, LINE_ERRORS):
+            return True
+        # Of one request it is known whether it was sent, and a read asks for nothing.
+        return self.started is not None and self.request[1] not in _READS if self.request else self.unit is not None
 
     @property
     def text(self) -> Text:
@@ -107,21 +113,7 @@ class DrivebusError(Exception):
         return tuple(part for part in self.text.parts if isinstance(part, Advice))
 
 
-_READS = (0x01, 0x02, 0x03, 0x04)
-
-
-class _LineError(DrivebusError):
-    """What a line can do to any request: of one that left, nothing is known."""
-
-    @property
-    def may_have_taken(self) -> bool:
-        """See `DrivebusError`. Of one request it is known whether that was sent, and a read asks for nothing."""
-        if self.request:
-            return self.started is not None and self.request[1] not in _READS
-        return self.unit is not None
-
-
-class PortError(_LineError, OSError):
+class PortError(DrivebusError, OSError):
     """The port is missing, busy, not permitted, or lost. The next call opens it again.
 
     Did the drive take it? If the port was lost after the request had left, it may have.
@@ -142,14 +134,14 @@ class PortError(_LineError, OSError):
         return rebuild, (kind, message, {**state, "errno": self.errno})
 
 
-class NoAnswer(_LineError, TimeoutError):
+class NoAnswer(DrivebusError, TimeoutError):
     """The unit stayed silent.
 
     Did the drive take it? It may have: a silent drive has either not heard the request, or its answer was lost.
     """
 
 
-class BadAnswer(_LineError):
+class BadAnswer(DrivebusError):
     """Bytes came, but not a valid answer to the request. They are in `raw`.
 
     Did the drive take it? It may have: only its answer is known to be bad.

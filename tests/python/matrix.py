@@ -66,7 +66,7 @@ RECTIFIERS = ("gd600-rectifier", "gd3000-rectifier")
 """They have no motor and no commands; the simulated ones take INVT's words."""
 INVT_STOP = (0x2000, 5)
 
-_STEP = 31
+_STEP = 23
 """From one case of the sample to the next: prime to how many there are of all that a case is made of, so that it meets
 each kind."""
 
