@@ -24,7 +24,7 @@ def test_it_is_read_as_the_word_it_is() -> None:
     with of("gd350") as (_, drive):
         # What the simulated drive has there was typed apart from the profile: P12.00 is 500, and each next is one more.
         assert drive.read("P12.01") == 501
-        assert drive.read("p12-1") == 501
+        assert drive.read("p12-01") == 501
         assert drive.read("P12.00", "P00.11", "P12.02") == {"P12.00": 500, "P00.11": 10.0, "P12.02": 502}
         assert drive.snapshot("P12.03").units == {"P12.03": "raw"}
         with pytest.raises(Refused) as refused:
@@ -84,7 +84,7 @@ def test_only_a_word_is_written(value: object) -> None:
 
 
 def test_what_is_known_of_it_is_said_plainly() -> None:
-    known = Profile.builtin("gd350").describe("p12.1")
+    known = Profile.builtin("gd350").describe("p12.01")
     assert (known.name, known.code, known.address, known.unit, known.listed) == (
         "P12.01",
         "P12.01",

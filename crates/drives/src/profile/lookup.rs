@@ -82,18 +82,16 @@ fn numbered_from_40001(name: &str) -> Option<u16> {
 }
 
 /// Whether `wanted` has fewer digits behind its point than `code`, and could be another number with all of them.
-fn lacks_a_digit(wanted: &str, code: &str) -> bool {
+pub(super) fn lacks_a_digit(wanted: &str, code: &str) -> bool {
     let digits = |text: &str| text.bytes().rev().take_while(u8::is_ascii_digit).count();
     digits(wanted) < digits(code) && !wanted.ends_with('0')
 }
 
-fn unclear(name: &str, group: u8, index: u8) -> NameError {
-    let other = u16::from(index) * 10;
-    NameError::Unclear {
-        name: name.to_owned(),
-        one: format!("P{group:02}.{index:02}"),
-        other: format!("P{group:02}.{other}"),
-    }
+/// `name`, which lacks a digit of `code`.
+pub(super) fn unclear(name: &str, code: &str) -> NameError {
+    let (head, last) = code.split_at_checked(code.len().saturating_sub(1)).unwrap_or((code, ""));
+    let other = format!("{}{last}0", head.strip_suffix('0').unwrap_or(head));
+    NameError::Unclear { name: name.to_owned(), one: code.to_owned(), other }
 }
 
 impl Profile {
@@ -127,7 +125,7 @@ impl Profile {
             }
             if let Some(entry) = self.numbered(group, index) {
                 let code = entry.code().unwrap_or_default();
-                return if lacks_a_digit(wanted, code) { Err(unclear(name, group, index)) } else { Ok(entry) };
+                return if lacks_a_digit(wanted, code) { Err(unclear(name, code)) } else { Ok(entry) };
             }
         }
         if let Some(address) = parse_address(wanted) {

@@ -8,7 +8,7 @@ use drivebus_drives::{Entry, Evidence, NameError, Profile, Store};
 fn a_code_tells_its_address() {
     for (family, code, called, address) in [
         ("gd350", "P05.01", "P05.01", 0x0501),
-        ("gd350", "p5.1", "P05.01", 0x0501),
+        ("gd350", "p5.01", "P05.01", 0x0501),
         ("gd350", "P98-99", "P98.99", 0x6263),
         ("gd600", "P10.10", "P10.10", 0x0A0A),
         ("gd3000", " P0501 ", "P05.01", 0x0501),
@@ -51,6 +51,8 @@ fn what_is_no_code_of_the_family_stays_unknown() {
     let refused = |family: &str, name: &str| Profile::builtin(family).unwrap().resolve(name).unwrap_err().to_string();
     for (family, name, said) in [
         ("gd350", "P99.01", "the maker's own"),
+        // It may be P05.10 as well.
+        ("gd350", "P05.1", "may be P05.01 or P05.10"),
         ("gd350", "F0-12", "gd350 has no \"F0-12\""),
         ("gd350", "P100.01", "gd350 has no"),
         ("gd350", "P05.100", "gd350 has no"),
@@ -72,11 +74,11 @@ fn in_every_family_each_code_without_a_row_is_where_nothing_else_is() {
         let profile = Profile::builtin(name).unwrap();
         let rows: BTreeSet<u16> = profile.entries().filter_map(Entry::address).collect();
         // Beyond 99 there is none, and no row has an index between 60 and 98: some numbers stand for all of these. What is
-        // no code takes longest, for it looks for the closest name; so each group has every fifth index, another each time.
+        // no code takes longest, for it looks for the closest name; so each group has every seventh index, another each time.
         let groups = (0..=100).chain([127, 128, 255_u8]);
-        let indices = |group: u8| (group % 5..=60).step_by(5).chain([0, 1, 98, 99, 100, 128, 255]);
+        let indices = |group: u8| (group % 7..=60).step_by(7).chain([0, 1, 98, 99, 100, 128, 255]);
         for (group, index) in groups.flat_map(|group| indices(group).map(move |index| (group, index))) {
-            let Ok(entry) = profile.resolve(&format!("P{group}.{index}")) else { continue };
+            let Ok(entry) = profile.resolve(&format!("P{group}.{index:02}")) else { continue };
             let address = entry.address().unwrap_or_else(|| panic!("{name} {}", entry.name()));
             if entry.is_listed() {
                 continue;
