@@ -49,7 +49,7 @@ pub(super) struct Connection {
 ///
 /// # Errors
 ///
-/// The system's: it gives no thread, or no second handle of the stream.
+/// The system's: it gives no thread.
 pub(super) fn serve(connection: Connection, stream: Stream) -> std::io::Result<()> {
     // An answer is one small message, and its client waits for it.
     stream.set_nodelay(true)?;
@@ -63,7 +63,7 @@ pub(super) fn serve(connection: Connection, stream: Stream) -> std::io::Result<(
         let why = read(&reader, &letters);
         letters.end(why);
     })?;
-    let letters = Arc::clone(&mailbox);
+    let (letters, end) = (Arc::clone(&mailbox), Arc::clone(&stream));
     let desk = std::thread::Builder::new().name("drivebus-tcp".to_owned());
     let spawned = desk.spawn(move || {
         let desk = Desk::new(connection.within, IN_FLIGHT);
@@ -74,6 +74,7 @@ pub(super) fn serve(connection: Connection, stream: Stream) -> std::io::Result<(
     });
     if spawned.is_err() {
         mailbox.end(String::new());
+        let _ = end.shutdown(Shutdown::Both);
     }
     spawned.map(drop)
 }
