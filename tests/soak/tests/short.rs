@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use drivebus_soak::{Plan, run};
 
-/// Enough of everything in 20 000 calls: more faults, and an adapter that is pulled out every few seconds.
+/// Enough of everything in 12 000 calls: more faults, and an adapter that is pulled out every few seconds.
 fn plan(seed: u64, threads: usize, whole: bool) -> Plan {
     Plan {
-        calls: 20_000,
+        calls: 12_000,
         seed,
         threads,
         whole,
