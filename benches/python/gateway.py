@@ -25,7 +25,6 @@ from benches.python.figures import markdown, show
 import drivebus
 
 WORDS, MONITOR, RESPONSE_DELAY = 1, 0x3000, 0x0E03
-PDU = struct.pack(">BHH", 3, MONITOR, WORDS)
 CLIENTS, IN_FLIGHT = 4, 4
 
 
@@ -86,15 +85,16 @@ class Client:
         self._socket = socket.create_connection((host, int(port)))
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    def ask(self) -> None:
-        """One request leaves."""
-        self._socket.sendall(struct.pack(">HHHB", 1, 0, 1 + len(PDU), 1) + PDU)
+    def ask(self, number: int = 0) -> None:
+        """A request leaves; each *number*, 0..15, asks for another word: the same reads that wait are asked once."""
+        self._socket.sendall(struct.pack(">HHHBBHH", number, 0, 6, 1, 3, MONITOR + number, WORDS))
 
-    def hear(self) -> None:
-        """One answer comes."""
+    def hear(self) -> int:
+        """An answer comes; its number."""
         answer = self._socket.recv(9 + 2 * WORDS, socket.MSG_WAITALL)
         if answer[7:9] != bytes([3, 2 * WORDS]):
             raise RuntimeError(f"a read was answered by {answer.hex(' ')}")
+        return answer[1]
 
     def read(self) -> None:
         """One after the other."""
@@ -122,12 +122,12 @@ def by_several(gateway: drivebus.Gateway, seconds: float) -> tuple[list[float], 
 
     def push(place: int) -> None:
         client = Client(gateway)
-        for _ in range(IN_FLIGHT):
-            client.ask()
+        for number in range(IN_FLIGHT):
+            client.ask(place * IN_FLIGHT + number)
         while time.monotonic() < end:
-            client.hear()
+            number = client.hear()
             counts[place] += 1
-            client.ask()
+            client.ask(number)
         client.close()
 
     threads = [threading.Thread(target=push, args=(place,)) for place in range(CLIENTS)]
