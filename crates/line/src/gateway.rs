@@ -183,8 +183,8 @@ impl Door {
         let seat = bus.seat();
         drop(bus);
         let (stream, host) = (Arc::new(Kept::new(stream)), peer.ip().to_canonical());
-        let Some((place, gone)) = self.clients.enter(Arc::clone(&stream), host, monotonic()) else { return Ok(()) };
-        if gone.is_some() {
+        let Some((place, gave_way)) = self.clients.enter(Arc::clone(&stream), host, monotonic()) else { return Ok(()) };
+        if gave_way {
             self.counts.gave_way(peer);
         }
         self.counts.let_in();

@@ -11,8 +11,8 @@ use crate::system::inherited::Kept;
 pub(super) type Stream = Arc<Kept<TcpStream>>;
 
 /// Connections at a time, of all and of one host.
-pub(super) const MOST: usize = 64;
-pub(super) const MOST_OF_ONE: usize = 16;
+const MOST: usize = 64;
+const MOST_OF_ONE: usize = 16;
 
 /// One connection.
 #[derive(Debug)]
@@ -42,14 +42,9 @@ impl Clients {
         self.inside.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Lets the other end of `stream` in. Where no more may be, the one that has not asked for the longest gives way, and its
-    /// host is told; `None`: nobody comes in any more.
-    pub(super) fn enter(
-        self: &Arc<Self>,
-        stream: Stream,
-        host: IpAddr,
-        now: Instant,
-    ) -> Option<(Place, Option<IpAddr>)> {
+    /// Lets the other end of `stream` in. Where no more may be, the one that has not asked for the longest gives way,
+    /// which is told; `None`: nobody comes in any more.
+    pub(super) fn enter(self: &Arc<Self>, stream: Stream, host: IpAddr, now: Instant) -> Option<(Place, bool)> {
         let mut inside = self.lock();
         if inside.is_closed {
             return None;
@@ -63,7 +58,7 @@ impl Clients {
         inside.numbers += 1;
         let number = inside.numbers;
         inside.clients.push(Client { number, host, asked: now, stream });
-        Some((Place { clients: Arc::clone(self), number }, gone.map(|gone| gone.host)))
+        Some((Place { clients: Arc::clone(self), number }, gone.is_some()))
     }
 
     pub(super) fn count(&self) -> usize {

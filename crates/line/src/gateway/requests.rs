@@ -1,6 +1,6 @@
 //! What clients of Modbus TCP send, taken apart: one request after the other, or why the connection cannot go on.
 
-use crate::ports::mbap::{MAX_BODY, MIN_BODY, PREFIX};
+use crate::ports::mbap::{MAX_BODY, MIN_BODY, message};
 
 /// One request, as it came.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -91,14 +91,7 @@ fn first(bytes: &[u8]) -> Result<Option<(Asked, &[u8])>, NotModbus> {
 
 /// The message that brings `pdu` back as the answer of `unit` to `transaction`.
 pub(super) fn answer(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
-    let length = u16::try_from(1 + pdu.len()).unwrap_or(u16::MAX);
-    let mut message = Vec::with_capacity(PREFIX + 1 + pdu.len());
-    message.extend_from_slice(&transaction.to_be_bytes());
-    message.extend_from_slice(&[0, 0]);
-    message.extend_from_slice(&length.to_be_bytes());
-    message.push(unit);
-    message.extend_from_slice(pdu);
-    message
+    message(transaction, &[&[unit], pdu])
 }
 
 #[cfg(test)]
@@ -107,6 +100,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::ports::mbap::PREFIX;
 
     fn asked() -> impl Strategy<Value = Asked> {
         (any::<u16>(), any::<u8>(), vec(any::<u8>(), 1..=253)).prop_map(|(transaction, unit, pdu)| Asked {

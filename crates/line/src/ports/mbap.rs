@@ -128,6 +128,19 @@ impl ModbusTcp {
     }
 }
 
+/// The message that carries `body`, which is a unit and a PDU, in pieces.
+pub(crate) fn message(transaction: u16, body: &[&[u8]]) -> Vec<u8> {
+    let length: usize = body.iter().map(|piece| piece.len()).sum();
+    let mut message = Vec::with_capacity(PREFIX + length);
+    message.extend_from_slice(&transaction.to_be_bytes());
+    message.extend_from_slice(&[0, 0]);
+    message.extend_from_slice(&u16::try_from(length).unwrap_or(u16::MAX).to_be_bytes());
+    for piece in body {
+        message.extend_from_slice(piece);
+    }
+    message
+}
+
 impl Line for ModbusTcp {
     fn now(&self) -> Instant {
         monotonic()
@@ -168,13 +181,8 @@ impl Line for ModbusTcp {
         }
         self.transaction = self.transaction.wrapping_add(1);
         self.waiting = true;
-        let [length_high, length_low] = u16::try_from(body.len()).unwrap_or(u16::MAX).to_be_bytes();
-        let [high, low] = self.transaction.to_be_bytes();
-        let mut message = Vec::with_capacity(PREFIX + MAX_BODY);
-        message.extend_from_slice(&[high, low, 0, 0, length_high, length_low]);
-        message.extend_from_slice(body);
         // In one piece: some servers take each segment for a whole message.
-        self.connection.send(&message)?;
+        self.connection.send(&message(self.transaction, &[body]))?;
         Ok(monotonic())
     }
 
