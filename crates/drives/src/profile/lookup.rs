@@ -81,17 +81,16 @@ fn numbered_from_40001(name: &str) -> Option<u16> {
     u16::try_from(number.checked_sub(first)?).ok()
 }
 
-/// Whether `wanted` has fewer digits behind its point than `code`, and could be another number with all of them.
-pub(super) fn lacks_a_digit(wanted: &str, code: &str) -> bool {
+/// That `name` has all the digits of `code` behind its point, or could be no other number with them.
+pub(super) fn is_clear(name: &str, code: &str) -> Result<(), NameError> {
     let digits = |text: &str| text.bytes().rev().take_while(u8::is_ascii_digit).count();
-    digits(wanted) < digits(code) && !wanted.ends_with('0')
-}
-
-/// `name`, which lacks a digit of `code`.
-pub(super) fn unclear(name: &str, code: &str) -> NameError {
+    let wanted = name.trim();
+    if digits(wanted) >= digits(code) || wanted.ends_with('0') {
+        return Ok(());
+    }
     let (head, last) = code.split_at_checked(code.len().saturating_sub(1)).unwrap_or((code, ""));
     let other = format!("{}{last}0", head.strip_suffix('0').unwrap_or(head));
-    NameError::Unclear { name: name.to_owned(), one: code.to_owned(), other }
+    Err(NameError::Unclear { name: name.to_owned(), one: code.to_owned(), other })
 }
 
 impl Profile {
@@ -124,8 +123,7 @@ impl Profile {
                 return Err(NameError::Closed { profile: self.name().to_owned(), name: name.to_owned() });
             }
             if let Some(entry) = self.numbered(group, index) {
-                let code = entry.code().unwrap_or_default();
-                return if lacks_a_digit(wanted, code) { Err(unclear(name, code)) } else { Ok(entry) };
+                return is_clear(name, entry.code().unwrap_or_default()).map(|()| entry);
             }
         }
         if let Some(address) = parse_address(wanted) {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::entry::{Access, Entry, Kind, names};
 use crate::evidence::Evidence;
 use crate::profile::Profile;
-use crate::profile::lookup::{NameError, lacks_a_digit, unclear};
+use crate::profile::lookup::{NameError, is_clear};
 use crate::quantity::Quantity;
 use crate::text::{parameter_address, parse_code, parse_loose_code};
 
@@ -27,13 +27,7 @@ impl Profile {
         // A row may be called what looks like a code. Who is not found is searched for, which takes its time: that is last.
         let is_called = |entry: &Entry| names(entry).any(|known| known.eq_ignore_ascii_case(name.trim()));
         match self.unlisted(name) {
-            Some(entry) if !self.entries().any(is_called) => {
-                if lacks_a_digit(name.trim(), entry.name()) {
-                    Err(unclear(name, entry.name()))
-                } else {
-                    Ok(Cow::Owned(entry))
-                }
-            }
+            Some(entry) if !self.entries().any(is_called) => is_clear(name, entry.name()).map(|()| Cow::Owned(entry)),
             _ => self.find(name).map(Cow::Borrowed),
         }
     }
