@@ -65,7 +65,7 @@ REFERENCE: Contents = [
     ("Profiles", ["Profile", "profiles"]),
     ("Parameters in a file", ["Backup", "Diff", "Difference", "Restoration", "Restored"]),
     ("Recordings, other masters, figures", ["Recorder", "sniff", "Exchange", "Stats", "Link"]),
-    ("Modbus TCP", ["Gateway", "GatewayStats"]),
+    ("Modbus TCP", ["Gateway", "Allow", "GatewayStats"]),
     ("Simulation", ["Simulator"]),
     ("Modules", ["doctor", "record", "rtu", "sim", "trial", "crc16"]),
     (

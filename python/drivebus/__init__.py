@@ -52,7 +52,7 @@ if TYPE_CHECKING:
         Unverified,
         WrongDrive,
     )
-    from drivebus.gateway import Gateway, GatewayStats
+    from drivebus.gateway import Allow, Gateway, GatewayStats
     from drivebus.identify.results import Found, Identification
     from drivebus.line.poll_samples import Batch, Sample
     from drivebus.line.serial_ports import SerialPort, ports
@@ -79,6 +79,7 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
+    "Allow",
     "Backup",
     "BadAnswer",
     "BadArgument",
@@ -159,7 +160,7 @@ if not TYPE_CHECKING:
             "bus": ("Bus",),
             "discovery": ("Discovery",),
             "drive": ("Drive",),
-            "gateway": ("Gateway", "GatewayStats"),
+            "gateway": ("Allow", "Gateway", "GatewayStats"),
             "errors": (
                 "BadAnswer",
                 "BadArgument",

@@ -14,6 +14,7 @@ from drivebus.errors import Decision
 
 _T_co = TypeVar("_T_co", covariant=True)
 _Piece: TypeAlias = tuple[str, bytes, float, float, float | None, float, float | None, str | None]
+_Writable: TypeAlias = tuple[str, int, list[int] | None, str, int | None, str, int | None]
 
 __version__: Final[str]
 __all__ = [
@@ -662,8 +663,23 @@ class Plan:
 class Gateway:
     """A server for Modbus TCP before a bus."""
 
-    def __new__(cls, bus: Bus, address: str, within: float, /) -> Gateway:
-        """Listens at once. PortError: not at *address*."""
+    def __new__(
+        cls,
+        bus: Bus,
+        address: str,
+        within: float,
+        /,
+        *,
+        rules: list[tuple[list[str], list[int], list[int], list[_Writable]]],
+        units: list[tuple[int, list[_Writable], list[list[bytes]], tuple[bytes, Sequence[bytes]] | None]],
+        dead_man: float | None,
+        audit: str | None,
+    ) -> Gateway:
+        """Listens at once. PortError: not at *address*, or *audit* cannot be written.
+
+        A rule is networks, units, functions, and what may be written; none: all may read. A unit has its stops and what
+        halts it.
+        """
     @property
     def address(self) -> str: ...
     def stats(self) -> dict[str, int]:

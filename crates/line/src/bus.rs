@@ -323,6 +323,26 @@ impl Bus {
         }
     }
 
+    /// As [`leave_will`](Self::leave_will), for a client of this program, which [`carry_out_will`](Self::carry_out_will) halts
+    /// the unit for; `then` hears whether it took that. `None`: nobody could halt it.
+    #[cfg(feature = "tcp")]
+    pub(crate) fn leave_will_for(
+        &self,
+        client: String,
+        will: LastWill,
+        then: impl FnOnce(bool) + Send + 'static,
+    ) -> Option<u64> {
+        (!self.is_closed()).then(|| self.port().wills.leave_for(client, will, Box::new(then))).flatten()
+    }
+
+    /// Carries out now the will of this number.
+    #[cfg(feature = "tcp")]
+    pub(crate) fn carry_out_will(&self, number: u64) {
+        if self.port().is_of_this_process() {
+            self.port().wills.carry_out_now(number);
+        }
+    }
+
     /// To be called by each thread that works for this bus alone: it goes before the programs around it, where the
     /// system allows that; where it does not, [`notes`](Self::notes) says so. In virtual time nothing is asked for.
     pub fn enter_thread(&self) {

@@ -2,61 +2,109 @@
 //!
 //! Each connection is a program of the queue: one that asks much takes no more turns than one that asks little, and a stop
 //! goes before them all. What cannot be answered in time is answered by 0BH, and never afterwards for that transaction; what
-//! is not sent by then, or when the client hangs up, is taken back. Only reads are let pass.
+//! is not sent by then, or when the client hangs up, is taken back. Only reads are let pass, unless the rules say otherwise.
+//! Whoever commanded motion and is gone or silent has its motor halted.
 //!
 //! | room | what is in it |
 //! | --- | --- |
 //! | `requests` | what clients send, taken apart |
-//! | `rights` | what they may ask |
+//! | `network`, `rights` | what they may ask |
+//! | `wear` | how often they may write what wears a drive |
+//! | `commanders` | who commanded motion: a dead man's switch |
 //! | `desk` | what one of them has asked, and when it has to be answered |
 //! | `clients` | how many there may be, and who gives way |
-//! | `counts` | what happened |
+//! | `audit`, `counts` | what they wrote, and what happened |
 //! | `together` | reads that wait, and who waits for the same |
-//! | `mailbox`, `connection` | the two threads of each |
+//! | `common` | what all connections have in common |
+//! | `writing` | one write on its way |
+//! | `mailbox`, `connection`, `clerk` | the two threads of each |
 //!
 //! Source: *Modbus Messaging on TCP/IP Implementation Guide* V1.0b, §3.1.3 and §4.4.
 
+mod audit;
+mod clerk;
 mod clients;
+mod commanders;
+mod common;
 mod connection;
 mod counts;
 mod desk;
 mod mailbox;
+mod network;
 mod requests;
 mod rights;
 mod together;
+mod wear;
+mod writing;
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 pub use counts::GatewayStats;
+pub use network::{Network, NoNetwork};
 pub use requests::{Asked, NotModbus, Requests};
+pub use rights::{Halts, Means, READS, Rights, Rule, WRITES, Writable};
 
 use crate::bus::Bus;
+use crate::gateway::audit::Audit;
 use crate::gateway::clients::Clients;
+use crate::gateway::commanders::Commanders;
+use crate::gateway::common::{Common, Seen};
 use crate::gateway::connection::Connection;
 use crate::gateway::counts::Counts;
-use crate::gateway::together::Together;
+use crate::gateway::wear::Wear;
 use crate::system::clock::{LOOK_UP, monotonic};
 use crate::system::inherited::Kept;
 use crate::system::process::Process;
 
 /// How long an answer may take, where nothing else is said.
 pub const ANSWER_WITHIN: Duration = Duration::from_secs(1);
-/// How long is waited for the thread at the door when it is told to end.
+/// How long is waited for the connections, and for the thread at the door, when they are told to end.
 const TO_END: Duration = Duration::from_secs(1);
+
+/// How a gateway behaves.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct GatewayOptions {
+    /// How long an answer may take.
+    pub answer_within: Duration,
+    /// What clients may do.
+    pub rights: Rights,
+    /// What becomes of a motor whose client is gone or silent. Has to be said where clients may move one.
+    pub dead_man: Option<DeadMan>,
+    /// The file to which each write of a client is appended: a line of JSON.
+    pub audit: Option<PathBuf>,
+}
+
+/// What becomes of a motor that a client commanded which is gone, or silent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DeadMan {
+    /// It is halted when the client has hung up, or has asked nothing for so long.
+    After(Duration),
+    /// It runs on.
+    Off,
+}
+
+impl Default for GatewayOptions {
+    /// Answers within a second, reads only, no audit.
+    fn default() -> Self {
+        Self { answer_within: ANSWER_WITHIN, rights: Rights::default(), dead_man: None, audit: None }
+    }
+}
 
 /// A server for Modbus TCP before a [`Bus`], until it is dropped. It keeps the bus from nothing: where that is closed, clients
 /// are told 0AH.
 ///
 /// ```no_run
 /// # fn example(bus: std::sync::Arc<drivebus_line::Bus>) -> std::io::Result<()> {
-/// use drivebus_line::gateway::{ANSWER_WITHIN, Gateway};
+/// use drivebus_line::gateway::{Gateway, GatewayOptions};
 ///
-/// let gateway = Gateway::open(&bus, "127.0.0.1:1502", ANSWER_WITHIN)?;
+/// let gateway = Gateway::open(&bus, "127.0.0.1:1502", GatewayOptions::default())?;
 /// println!("reads are answered at {}", gateway.address());
 /// # Ok(())
 /// # }
@@ -73,31 +121,50 @@ pub struct Gateway {
 }
 
 impl Gateway {
-    /// Listens at `address`, such as `127.0.0.1:1502`; port 0 takes one that is free. Each answer goes out `within` that of
-    /// its request.
+    /// Listens at `address`, such as `127.0.0.1:1502`; port 0 takes one that is free.
     ///
     /// # Errors
     ///
-    /// The system's: the address is not one of this machine, is taken, or may not be listened at.
-    pub fn open(bus: &Arc<Bus>, address: &str, within: Duration) -> io::Result<Self> {
+    /// The system's: the address is not one of this machine, is taken, or may not be listened at; the audit cannot be written.
+    /// [`io::ErrorKind::InvalidInput`]: clients may move a motor, and nothing says what becomes of it when they are gone.
+    pub fn open(bus: &Arc<Bus>, address: &str, options: GatewayOptions) -> io::Result<Self> {
+        let GatewayOptions { answer_within: within, rights, dead_man, audit } = options;
+        if rights.moves_any() && dead_man.is_none() {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "clients may move a motor, and nothing says what becomes of it when they are gone",
+            ));
+        }
+        let counts = Arc::<Counts>::default();
+        let tells = Arc::clone(&counts);
+        let audit = audit.map(|path| Audit::open(&path, move |why| tells.tell(why))).transpose()?.unwrap_or_default();
         let addresses: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
         let listener = Kept::new(TcpListener::bind(&addresses[..])?);
         let gateway = Self {
             address: listener.local_addr()?,
             clients: Arc::default(),
-            counts: Arc::default(),
+            counts: Arc::clone(&counts),
             is_closed: Arc::default(),
             opened_by: Process::current(),
             door: Mutex::default(),
         };
-        let door = Door {
+        let common = Common {
             bus: Arc::downgrade(bus),
             within,
-            clients: Arc::clone(&gateway.clients),
-            counts: Arc::clone(&gateway.counts),
+            rights,
+            dead_man: match dead_man {
+                Some(DeadMan::After(silence)) => Some(silence),
+                Some(DeadMan::Off) | None => None,
+            },
+            audit,
+            counts,
             together: Arc::default(),
-            is_closed: Arc::clone(&gateway.is_closed),
+            wear: Wear::default(),
+            commanders: Commanders::default(),
+            seen: Seen::default(),
         };
+        let (clients, is_closed) = (Arc::clone(&gateway.clients), Arc::clone(&gateway.is_closed));
+        let door = Door { common: Arc::new(common), clients, is_closed };
         let standing =
             thread::Builder::new().name("drivebus-tcp-door".to_owned()).spawn(move || door.stand(&listener))?;
         *gateway.door.lock().unwrap_or_else(PoisonError::into_inner) = Some(standing);
@@ -123,7 +190,7 @@ impl Gateway {
     pub fn close(&self) {
         // In a forked child none of it is there.
         if self.opened_by.is_current() && !self.is_closed.swap(true, Ordering::AcqRel) {
-            self.clients.close();
+            self.clients.close(TO_END);
             let standing = self.door.lock().unwrap_or_else(PoisonError::into_inner).take();
             // It is woken by somebody who knocks. Where nobody can, nobody has to be kept out, and it is left to stand.
             if TcpStream::connect_timeout(&reachable(self.address), TO_END).is_ok()
@@ -154,11 +221,8 @@ fn reachable(address: SocketAddr) -> SocketAddr {
 
 /// Who lets clients in.
 struct Door {
-    bus: Weak<Bus>,
-    within: Duration,
+    common: Arc<Common>,
     clients: Arc<Clients>,
-    counts: Arc<Counts>,
-    together: Arc<Together>,
     is_closed: Arc<AtomicBool>,
 }
 
@@ -171,7 +235,7 @@ impl Door {
                 Err(error) => Err(error),
             };
             if let Err(error) = served {
-                self.counts.tell(format!("a client cannot be let in now: {error}"));
+                self.common.counts.tell(format!("a client cannot be let in now: {error}"));
                 // No file is left to open, most likely: that does not end by being tried at once.
                 thread::sleep(LOOK_UP);
             }
@@ -179,18 +243,17 @@ impl Door {
     }
 
     fn let_in(&self, stream: TcpStream, peer: SocketAddr) -> io::Result<()> {
-        let Some(bus) = self.bus.upgrade() else { return Ok(()) };
+        let Some(bus) = self.common.bus.upgrade() else { return Ok(()) };
         let seat = bus.seat();
         drop(bus);
         let (stream, host) = (Arc::new(Kept::new(stream)), peer.ip().to_canonical());
         let Some((place, gave_way)) = self.clients.enter(Arc::clone(&stream), host, monotonic()) else { return Ok(()) };
         if gave_way {
-            self.counts.gave_way(peer);
+            self.common.counts.gave_way(peer);
         }
-        self.counts.let_in();
-        let (counts, together) = (Arc::clone(&self.counts), Arc::clone(&self.together));
-        let connection =
-            Connection { bus: Weak::clone(&self.bus), seat, peer, place, within: self.within, counts, together };
-        connection::serve(connection, stream)
+        self.common.counts.let_in();
+        let peer = SocketAddr::new(host, peer.port());
+        let common = Arc::clone(&self.common);
+        connection::serve(Connection { common, seat, peer, name: peer.to_string(), place, stream })
     }
 }

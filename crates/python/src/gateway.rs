@@ -1,13 +1,60 @@
 //! `Gateway` for Python: a server for Modbus TCP before a bus.
 
-use drivebus_line::gateway::Gateway as CoreGateway;
-use drivebus_line::{PortError, PortErrorKind};
+use std::path::PathBuf;
+
+use drivebus_line::gateway::{
+    DeadMan, Gateway as CoreGateway, GatewayOptions, Halts, Means, Network, Rights, Rule, Writable,
+};
+use drivebus_line::{LastWill, PortError, PortErrorKind};
+use drivebus_rtu::UnitAddress;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arguments::duration;
 use crate::bus::Bus;
-use crate::errors::port_error;
+use crate::convert::table_of;
+use crate::errors::{bad_argument, port_error, refuse};
+
+/// Table and address, words, what it does, where the same is in RAM, name, and where it is shown.
+type GivenWrite = (String, u16, Option<Vec<u16>>, String, Option<u16>, String, Option<u16>);
+/// Networks, units, functions, and what may be written.
+type GivenRule = (Vec<String>, Vec<u8>, Vec<u8>, Vec<GivenWrite>);
+/// A unit, its stops, and its will: ways, look.
+type GivenHalts = (u8, Vec<GivenWrite>, Vec<Vec<Vec<u8>>>, Option<(Vec<u8>, Vec<Vec<u8>>)>);
+
+fn rights(rules: Vec<GivenRule>, units: Vec<GivenHalts>) -> PyResult<Rights> {
+    let rules = rules.into_iter().map(|(networks, units, functions, writes)| {
+        let networks = networks.iter().map(|text| text.parse::<Network>().map_err(refuse));
+        let networks = networks.collect::<PyResult<_>>()?;
+        Ok(Rule { networks, units, functions, writes: writables(writes)? })
+    });
+    let mut rights = Rights::new(rules.collect::<PyResult<_>>()?);
+    for (unit, stops, ways, look) in units {
+        let will = LastWill::new(UnitAddress::by_name(unit), ways);
+        let will = match look {
+            Some((question, others)) => will.look(question, others),
+            None => will,
+        };
+        rights.units.insert(unit, Halts { stops: writables(stops)?, will });
+    }
+    Ok(rights)
+}
+
+fn writables(given: Vec<GivenWrite>) -> PyResult<Vec<Writable>> {
+    given.into_iter().map(writable).collect()
+}
+
+fn writable((table, address, words, means, instead, name, shown_at): GivenWrite) -> PyResult<Writable> {
+    let table = table_of(&table)?;
+    let means = match means.as_str() {
+        "sets" => Means::Sets,
+        "wears" => Means::Wears { instead },
+        "stops" => Means::Stops,
+        "moves" => Means::Moves,
+        _ => return Err(bad_argument(format!("{means} is nothing that a write does"))),
+    };
+    Ok(Writable { table, address, words, means, name, shown_at })
+}
 
 /// A server for Modbus TCP, until it is closed.
 #[pyclass(frozen, module = "drivebus._native")]
@@ -19,11 +66,28 @@ pub(crate) struct Gateway {
 #[pymethods]
 impl Gateway {
     #[new]
-    #[pyo3(signature = (bus, address, within, /))]
-    fn new(bus: &Bound<'_, Bus>, address: &str, within: f64) -> PyResult<Self> {
-        let within = duration("answer_within", within)?;
+    #[pyo3(signature = (bus, address, within, /, *, rules, units, dead_man, audit))]
+    fn new(
+        bus: &Bound<'_, Bus>,
+        address: &str,
+        within: f64,
+        rules: Vec<GivenRule>,
+        units: Vec<GivenHalts>,
+        dead_man: Option<f64>,
+        audit: Option<PathBuf>,
+    ) -> PyResult<Self> {
+        let mut options = GatewayOptions::default();
+        options.answer_within = duration("answer_within", within)?;
+        if !rules.is_empty() {
+            options.rights = rights(rules, units)?;
+        }
+        options.dead_man = Some(match dead_man {
+            Some(silence) => DeadMan::After(duration("dead_man", silence)?),
+            None => DeadMan::Off,
+        });
+        options.audit = audit;
         let core = &bus.get().core;
-        let opened = bus.py().detach(|| CoreGateway::open(core, address, within));
+        let opened = bus.py().detach(|| CoreGateway::open(core, address, options));
         opened.map(|core| Self { core }).map_err(|error| {
             let kind = match error.kind() {
                 std::io::ErrorKind::AddrInUse => PortErrorKind::Busy,
@@ -55,6 +119,9 @@ impl Gateway {
             ("late", stats.late),
             ("busy", stats.busy),
             ("together", stats.together),
+            ("written", stats.written),
+            ("halted", stats.halted),
+            ("unaudited", stats.unaudited),
         ] {
             all.set_item(name, count)?;
         }

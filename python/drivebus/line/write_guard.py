@@ -14,7 +14,7 @@ from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.profile import Profile, profiles
 
-__all__ = ["check_words", "code_text", "prepare_guard"]
+__all__ = ["check_words", "code_text", "commanded_at", "prepare_guard"]
 
 _HINT = Text("nothing was sent; if it is meant, say ", argument("force", True))
 
@@ -80,6 +80,11 @@ def _plain(family: Profile, address: int) -> int:
         return address
     memory = family.memory()
     return address & ~(1 << (15 if memory is None else memory.bit))
+
+
+def commanded_at(address: int) -> str | None:
+    """The shipped families whose command register is at *address*, for people; None where there are none."""
+    return _command_registers().get(address)
 
 
 def prepare_guard() -> None:

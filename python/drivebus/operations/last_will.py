@@ -17,14 +17,14 @@ from drivebus.operations.drive_view import DriveView
 from drivebus.operations.raw_words import as_written
 from drivebus.profile import Profile
 
-__all__ = ["LastWill"]
+__all__ = ["WAYS", "LastWill", "look_of", "requests_of"]
 
 _READ = {"coil": 0x01, "discrete": 0x02, "holding": 0x03, "input": 0x04}
 _WRITE_COIL = 0x05
 _ANY = 1
 """Some unit: a PDU does not say which."""
 
-_WAYS = ("stop", "coast")
+WAYS = ("stop", "coast")
 """What halts a motor, a jog included: the first of them first."""
 
 
@@ -40,7 +40,7 @@ class LastWill:
     def __init__(self, unit: DriveView, silence: float = 0.0, first: str = "stop") -> None:
         self._unit = unit
         self._silence = silence
-        self._ways = sorted(_WAYS, key=lambda way: way != first)
+        self._ways = sorted(WAYS, key=lambda way: way != first)
         self._number: int | None = None
 
     def leave(self) -> None:
@@ -49,9 +49,9 @@ class LastWill:
         # Somebody's own bus may know of no such thing.
         if self._number is None and isinstance(line, KeepsWills):
             usable = [way for way in self._ways if unit.evidence.unusable(way) is None]
-            ways = [_requests(unit.profile, way) for way in usable]
+            ways = [requests_of(unit.profile, way) for way in usable]
             if ways:
-                look = None if unit.identity.trusted else _look(unit.profile)
+                look = None if unit.identity.trusted else look_of(unit.profile)
                 self._number = line.leave_will(unit.address, ways, look=look, silence=self._silence)
 
     def unsure(self) -> str:
@@ -75,7 +75,7 @@ class LastWill:
             line.withdraw_will(number)
 
 
-def _requests(profile: Profile, command: str) -> list[bytes]:
+def requests_of(profile: Profile, command: str) -> list[bytes]:
     """The PDUs of *command*, as it is sent."""
     first = profile.command_first(command)
     return [_write(profile, *each) for each in (first, profile.command(command)) if each is not None]
@@ -94,7 +94,7 @@ def _pdu(frame: bytes) -> bytes:
 
 
 @functools.lru_cache(maxsize=16)
-def _look(profile: Profile) -> tuple[bytes, tuple[bytes, ...]] | None:
+def look_of(profile: Profile) -> tuple[bytes, tuple[bytes, ...]] | None:
     """The read by which a unit says what it is, and the answers of units of other families; None if there is none."""
     own = codes.address_of(profile)
     at = next(iter(codes.registers()), None) if own is None else own

@@ -9,6 +9,10 @@ use crate::line::Opener;
 use crate::options::{BusOptions, LastWill};
 use crate::ports::key::PortKey;
 
+/// Never called.
+#[cfg(feature = "tcp")]
+pub(super) type Then = Box<dyn FnOnce(bool) + Send>;
+
 /// There are none.
 #[derive(Debug)]
 pub(super) struct Wills;
@@ -27,6 +31,14 @@ impl Wills {
     pub(super) fn leave(self: &Arc<Self>, _will: LastWill) -> Option<u64> {
         None
     }
+
+    #[cfg(feature = "tcp")]
+    pub(super) fn leave_for(self: &Arc<Self>, _client: String, _will: LastWill, _then: Then) -> Option<u64> {
+        None
+    }
+
+    #[cfg(feature = "tcp")]
+    pub(super) fn carry_out_now(self: &Arc<Self>, _number: u64) {}
 
     pub(super) fn withdraw(&self, _number: u64) {}
 

@@ -86,7 +86,7 @@ pub(super) struct Wills {
 
 #[derive(Debug, Default)]
 struct State {
-    own: BTreeMap<u64, Paper>,
+    own: BTreeMap<u64, Left>,
     tokens: u64,
     halting: BTreeMap<UnitAddress, Halted>,
     /// How many wills of programs that live were seen at last.
@@ -101,12 +101,23 @@ struct State {
     notes: Vec<String>,
 }
 
+/// A will that was left.
+struct Left {
+    will: Will,
+    /// `None`: nobody but this program can find it.
+    paper: Option<Paper>,
+    then: Option<Then>,
+}
+
+/// Hears whether a unit took its halt; not called where another program halts it.
+pub(super) type Then = Box<dyn FnOnce(bool) + Send>;
+
 /// A unit that is being halted, for whom.
 #[derive(Debug)]
 struct Halted {
     course: Halting,
     /// The last of them is carried out; it stands for all.
-    wills: Vec<(Paper, Will)>,
+    wills: Vec<Left>,
     is_attended: bool,
 }
 
@@ -180,7 +191,6 @@ impl Wills {
         };
         let will = Will { program: readable(&will.program), ..will };
         let who = format!("{} (process {}), which ran unit {}, is gone", will.program, will.process, will.unit);
-        let unit = UnitAddress::by_name(will.unit);
         if will.characters != self.characters {
             state.note(&format!("{who}; it is not halted for it, since this port is open at other characters"));
             return;
@@ -194,11 +204,20 @@ impl Wills {
             state.note(&format!("{who}; it is not halted for it, since this port was made anew: `stop` halts it"));
             return paper.remove();
         }
+        self.enlist(state, Left { will, paper: Some(paper), then: None });
+    }
+
+    /// The unit of `left` is to be halted.
+    fn enlist(&self, state: &mut State, left: Left) {
+        let will = &left.will;
         let course = Halting::new(will.ways.len(), will.look.is_some(), Duration::from_nanos(will.silence));
-        let halted =
-            state.halting.entry(unit).or_insert_with(|| Halted { course, wills: Vec::new(), is_attended: false });
-        halted.wills.push((paper, will));
-        halted.wills.sort_by_key(|(_, will)| will.left);
+        let halted = state.halting.entry(UnitAddress::by_name(will.unit)).or_insert_with(|| Halted {
+            course,
+            wills: Vec::new(),
+            is_attended: false,
+        });
+        halted.wills.push(left);
+        halted.wills.sort_by_key(|left| left.will.left);
         self.halts.store(true, Ordering::Release);
     }
 
@@ -240,7 +259,7 @@ impl Wills {
             let says = now >= said + SAYS;
             if says {
                 said = now;
-                state.own.values().for_each(|paper| paper.is_alive(now));
+                state.own.values().filter_map(|left| left.paper.as_ref()).for_each(|paper| paper.is_alive(now));
             }
             let tells = is_guest && (std::mem::take(&mut state.untold) || says && !state.own.is_empty());
             let looks = !is_guest && state.living > 0;
@@ -275,43 +294,72 @@ impl Wills {
 
     /// Leaves `last` where the one who has the port finds it. `None` where nobody could.
     pub(super) fn leave(self: &Arc<Self>, last: LastWill) -> Option<u64> {
-        let place = self.place()?;
-        let now = monotonic();
-        let will = Will {
+        let will = self.written(last, own_name());
+        let paper = Some(self.on_paper(&will)?);
+        Some(self.keep(Left { will, paper, then: None }))
+    }
+
+    /// As [`leave`](Self::leave), for a client of this program: what is left can be [carried out](Self::carry_out_now) here as
+    /// well, and `then` hears whether the unit took it. So it is also kept where the port is of no kind that programs share.
+    #[cfg(feature = "tcp")]
+    pub(super) fn leave_for(self: &Arc<Self>, client: String, last: LastWill, then: Then) -> Option<u64> {
+        let will = self.written(last, client);
+        let paper = self.on_paper(&will);
+        // Where another program has the port, it has to be found there.
+        let stands = paper.is_some() || self.key.is_none();
+        stands.then(|| self.keep(Left { will, paper, then: Some(then) }))
+    }
+
+    fn written(&self, last: LastWill, program: String) -> Will {
+        Will {
             unit: last.unit.get(),
             ways: last.ways,
             look: last.look,
             timeout: nanos(self.timeout.min(LONGEST_ANSWER)),
             silence: nanos(last.silence),
-            port: self.key.as_ref()?.made(),
-            left: now.as_nanos(),
-            program: own_name(),
+            port: self.key.as_ref().map(PortKey::made).unwrap_or_default(),
+            left: monotonic().as_nanos(),
+            program,
             process: std::process::id(),
             characters: self.characters,
-        };
-        let paper = Paper::leave(&place, &will, now);
+        }
+    }
+
+    fn on_paper(&self, will: &Will) -> Option<Paper> {
+        self.key.as_ref()?;
+        let paper = Paper::leave(&self.place()?, will, monotonic());
+        if let Err(error) = &paper {
+            self.lock().note(&format!("nobody would halt unit {} for this program: {error}", will.unit));
+        }
+        paper.ok()
+    }
+
+    fn keep(self: &Arc<Self>, left: Left) -> u64 {
         let mut state = self.lock();
-        let paper = match paper {
-            Ok(paper) => paper,
-            Err(error) => {
-                state.note(&format!("nobody would halt unit {} for this program: {error}", will.unit));
-                return None;
-            }
-        };
         state.tokens += 1;
         let token = state.tokens;
-        state.own.insert(token, paper);
+        state.own.insert(token, left);
         state.untold = true;
         self.attend(&mut state);
         self.changed.notify_all();
-        Some(token)
+        token
     }
 
     /// The will that was left under this number is not carried out.
     pub(super) fn withdraw(&self, token: u64) {
-        let paper = self.lock().own.remove(&token);
-        if let Some(paper) = paper {
+        let left = self.lock().own.remove(&token);
+        if let Some(paper) = left.and_then(|left| left.paper) {
             paper.remove();
+        }
+    }
+
+    /// Carries out now what was left under this number.
+    #[cfg(feature = "tcp")]
+    pub(super) fn carry_out_now(self: &Arc<Self>, token: u64) {
+        let mut state = self.lock();
+        if let Some(left) = state.own.remove(&token) {
+            self.enlist(&mut state, left);
+            self.begin(&mut state);
         }
     }
 
@@ -353,7 +401,7 @@ impl Wills {
         let (state, now) = (self.lock(), monotonic());
         let mut kept = state.halting.iter().filter(|(_, halted)| halted.course.is_kept_from_others(now));
         let (unit, halted) = kept.find(|(halted, _)| unit.is_none_or(|unit| unit == **halted))?;
-        let (_, will) = halted.wills.last()?;
+        let Left { will, .. } = halted.wills.last()?;
         Some(Failure::BeingStopped { unit: unit.get(), program: will.program.clone(), process: will.process })
     }
 
@@ -374,7 +422,7 @@ impl Wills {
             let mut state = self.lock();
             let Some(halted) = state.halting.get_mut(&unit) else { return };
             let next = halted.course.next(monotonic());
-            let Some((_, will)) = halted.wills.last() else { return };
+            let Some(Left { will, .. }) = halted.wills.last() else { return };
             let will = will.clone();
             drop(state);
             let mut took = None;
@@ -409,7 +457,7 @@ impl Wills {
         let was_late = halted.course.is_late();
         change(halted);
         if halted.course.is_late() && !was_late {
-            let who = halted.wills.last().map(|(_, will)| format!("{} (process {})", will.program, will.process));
+            let who = halted.wills.last().map(|left| format!("{} (process {})", left.will.program, left.will.process));
             state.note(&format!(
                 "unit {unit} took no halt within {} s; {}, which ran it, is gone. It is still told to halt now and then: \
                  its motor may run",
@@ -431,8 +479,13 @@ impl Wills {
             format!("unit {unit} was not told to halt: {who}, and another drive answers at its address now")
         });
         drop(state);
-        for (paper, _) in halted.into_iter().flat_map(|halted| halted.wills) {
-            paper.remove();
+        for Left { paper, then, .. } in halted.into_iter().flat_map(|halted| halted.wills) {
+            if let Some(paper) = paper {
+                paper.remove();
+            }
+            if let Some(then) = then {
+                then(took);
+            }
         }
         self.changed.notify_all();
     }
@@ -448,6 +501,12 @@ impl Wills {
 
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for Left {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Left").field("will", &self.will).field("paper", &self.paper).finish_non_exhaustive()
     }
 }
 

@@ -1,7 +1,8 @@
 //! Who is connected, how many may be, and who gives way to one more.
 
 use std::net::{IpAddr, Shutdown, TcpStream};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use drivebus_rtu::Instant;
 
@@ -28,12 +29,15 @@ struct Client {
 #[derive(Debug, Default)]
 pub(super) struct Clients {
     inside: Mutex<Inside>,
+    left: Condvar,
 }
 
 #[derive(Debug, Default)]
 struct Inside {
     numbers: u64,
     clients: Vec<Client>,
+    /// How many have not ended, those included that gave way.
+    open: usize,
     is_closed: bool,
 }
 
@@ -56,6 +60,7 @@ impl Clients {
             let _ = gone.stream.shutdown(Shutdown::Both);
         }
         inside.numbers += 1;
+        inside.open += 1;
         let number = inside.numbers;
         inside.clients.push(Client { number, host, asked: now, stream });
         Some((Place { clients: Arc::clone(self), number }, gone.is_some()))
@@ -65,13 +70,14 @@ impl Clients {
         self.lock().clients.len()
     }
 
-    /// Ends all connections; nobody comes in any more.
-    pub(super) fn close(&self) {
+    /// Ends all connections, and waits until they have, so long at most; nobody comes in any more.
+    pub(super) fn close(&self, within: Duration) {
         let mut inside = self.lock();
         inside.is_closed = true;
         for client in &inside.clients {
             let _ = client.stream.shutdown(Shutdown::Both);
         }
+        let _ = self.left.wait_timeout_while(inside, within, |inside| inside.open > 0);
     }
 }
 
@@ -79,7 +85,8 @@ impl Clients {
 #[derive(Debug)]
 pub(super) struct Place {
     clients: Arc<Clients>,
-    number: u64,
+    /// Which one it is, of all that ever were.
+    pub(super) number: u64,
 }
 
 impl Place {
@@ -93,7 +100,10 @@ impl Place {
 
 impl Drop for Place {
     fn drop(&mut self) {
-        self.clients.lock().clients.retain(|one| one.number != self.number);
+        let mut inside = self.clients.lock();
+        inside.clients.retain(|one| one.number != self.number);
+        inside.open -= 1;
+        self.clients.left.notify_all();
     }
 }
 

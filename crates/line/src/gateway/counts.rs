@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::Hex;
+use crate::gateway::audit::Outcome;
 use crate::gateway::requests::Asked;
 
 /// Words that nobody has fetched; the oldest give way.
@@ -37,6 +38,12 @@ pub struct GatewayStats {
     pub busy: u64,
     /// Requests that were answered by the read that another one began.
     pub together: u64,
+    /// Writes that went out and were not refused by their unit.
+    pub written: u64,
+    /// Motors that were halted for a client that was gone or silent.
+    pub halted: u64,
+    /// Writes that stand in no audit, though they should: the disk did not follow.
+    pub unaudited: u64,
 }
 
 /// The same, while it happens.
@@ -52,6 +59,9 @@ pub(super) struct Counts {
     late: AtomicU64,
     busy: AtomicU64,
     together: AtomicU64,
+    written: AtomicU64,
+    halted: AtomicU64,
+    unaudited: AtomicU64,
     told: Mutex<VecDeque<String>>,
 }
 
@@ -82,11 +92,44 @@ impl Counts {
         count(if by_unit { &self.answered } else { &self.failed });
     }
 
-    pub(super) fn refused(&self, peer: SocketAddr, asked: &Asked) {
+    /// `why`: what is not allowed.
+    pub(super) fn refused(&self, peer: SocketAddr, why: &str, asked: &Asked) {
         count(&self.refused);
         let shown = &asked.pdu[..asked.pdu.len().min(16)];
         let more = if shown.len() < asked.pdu.len() { " …" } else { "" };
-        self.tell(format!("{peer} may only read units 1 to 247, and asked unit {}: {}{more}", asked.unit, Hex(shown)));
+        self.tell(format!("{peer} {why}: refused {}{more}", Hex(shown)));
+    }
+
+    /// What is at the address of a unit says that it is another one.
+    pub(super) fn another(&self, peer: SocketAddr, unit: u8) {
+        self.tell(format!("{peer} writes to unit {unit}, and another drive answers at its address: nothing was sent"));
+    }
+
+    /// A write ended.
+    pub(super) fn written(&self, outcome: Outcome) {
+        if matches!(outcome, Outcome::Done | Outcome::Sent | Outcome::Unknown) {
+            count(&self.written);
+        }
+    }
+
+    pub(super) fn unaudited(&self) {
+        count(&self.unaudited);
+        self.tell("a line of the audit is lost: the disk does not follow".to_owned());
+    }
+
+    /// The motor of `unit` is halted, since `client`, which commanded it, `why`.
+    pub(super) fn halts(&self, client: &str, unit: u8, why: &str) {
+        count(&self.halted);
+        self.tell(format!("{client}, which commanded the motor of unit {unit}, {why}: the motor is halted"));
+    }
+
+    /// Whether the unit `took` that.
+    pub(super) fn halted(&self, client: &str, unit: u8, took: bool) {
+        self.tell(if took {
+            format!("unit {unit} took the halt for {client}")
+        } else {
+            format!("unit {unit} was not halted for {client}: another drive answers at its address now")
+        });
     }
 
     pub(super) fn late(&self) {
@@ -128,6 +171,9 @@ impl Counts {
             late: of(&self.late),
             busy: of(&self.busy),
             together: of(&self.together),
+            written: of(&self.written),
+            halted: of(&self.halted),
+            unaudited: of(&self.unaudited),
         }
     }
 }

@@ -74,17 +74,37 @@ fn refusal(transaction: u16, unit: u8, function: u8, ExceptionCode(code): Except
     answer(transaction, unit, &[function | 0x80, code])
 }
 
-/// What a client is told of a call that failed. By the specification V1.1b3, §7, and for the gateway's two by the guide's
-/// §4.4.3.1: 0AH where the line cannot be used, 0BH where the unit did not answer as it must.
-pub(super) fn code_of(error: &CallError) -> ExceptionCode {
-    match error.failure {
-        Failure::Refused { code, .. } => code,
-        Failure::Port(_) | Failure::Closed | Failure::Forked | Failure::Reopened => {
-            ExceptionCode::GATEWAY_PATH_UNAVAILABLE
-        }
-        Failure::QueueFull { .. } => ExceptionCode::BUSY,
-        Failure::ReadOnly { .. } | Failure::NotARead { .. } => ExceptionCode::ILLEGAL_FUNCTION,
-        _ => ExceptionCode::GATEWAY_TARGET_SILENT,
+/// What a client is told of a call that failed, and what is known of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Failed {
+    pub(super) code: ExceptionCode,
+    /// Whether it is the unit's own word.
+    pub(super) is_by_unit: bool,
+    pub(super) may_have_acted: bool,
+}
+
+impl Failed {
+    /// It is known here that it cannot be done.
+    pub(super) const fn before(code: ExceptionCode) -> Self {
+        Self { code, is_by_unit: false, may_have_acted: false }
+    }
+}
+
+/// By the specification V1.1b3, §7, and for the gateway's two by the guide's §4.4.3.1: 0AH where the line cannot be used, 0BH
+/// where the unit did not answer as it must.
+impl From<&CallError> for Failed {
+    fn from(error: &CallError) -> Self {
+        let code = match error.failure {
+            Failure::Refused { code, .. } => code,
+            Failure::Port(_) | Failure::Closed | Failure::Forked | Failure::Reopened => {
+                ExceptionCode::GATEWAY_PATH_UNAVAILABLE
+            }
+            Failure::QueueFull { .. } => ExceptionCode::BUSY,
+            Failure::ReadOnly { .. } | Failure::NotARead { .. } => ExceptionCode::ILLEGAL_FUNCTION,
+            _ => ExceptionCode::GATEWAY_TARGET_SILENT,
+        };
+        let is_by_unit = matches!(error.failure, Failure::Refused { .. });
+        Self { code, is_by_unit, may_have_acted: error.may_have_acted() }
     }
 }
 

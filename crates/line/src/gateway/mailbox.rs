@@ -3,16 +3,17 @@
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-use drivebus_rtu::{ExceptionCode, Instant};
+use drivebus_rtu::Instant;
 
+use crate::gateway::desk::Failed;
 use crate::gateway::requests::Asked;
 use crate::system::clock::monotonic;
 
 /// Requests that a reader may have read beyond those that the desk has taken: then it reads no more.
 const AHEAD: usize = 64;
 
-/// What came of a request: the PDU of its answer, or the exception that says why there is none.
-pub(super) type Answered = Result<Vec<u8>, ExceptionCode>;
+/// What came of a request: the PDU of its answer, or why there is none.
+pub(super) type Answered = Result<Vec<u8>, Failed>;
 
 /// One thing that the desk is told.
 #[derive(Debug)]
