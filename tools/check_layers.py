@@ -173,6 +173,7 @@ OPERATIONS = [
     "bit_words",
     "waiting",
     "last_will",
+    "network_rights",
     "bus_timeout",
     "motor_block",
     "turning",

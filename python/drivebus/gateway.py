@@ -154,15 +154,15 @@ class Gateway:
         silence = None if dead_man in (None, "off") else checks.number("dead_man", dead_man, *DEAD_MAN)
         if dead_man is None and any(network_rights.moves(writes) for _, _, _, writes in rules):
             raise BadArgument(
-                "clients may move a motor, and nothing says what becomes of it when they are gone: say dead_man, seconds "
-                'after which it is halted, or "off" if it shall run on. Nothing listens'
+                "clients may move a motor, and nothing says what becomes of it when they are gone: say dead_man, "
+                'seconds after which it is halted, or "off" if it shall run on. Nothing listens'
             )
         self._native = _native.Gateway(
             core,
             address,
             within,
             rules=rules,
-            units=[tuple(halts) for halts in _halts(allow)],
+            units=list(_halts(allow)),
             dead_man=silence,
             audit=None if audit is None else checks.path("audit", audit),
         )
@@ -215,7 +215,9 @@ def _rules(allow: Allow, bus: Bus) -> Iterator[_Rule]:
     if (write or commands) and not allow.drives:
         raise BadArgument("what may be written is said of drives that are named: which are they? Nothing listens")
     if commands and units:
-        raise BadArgument(f"unit {units[0]} is no drive that is known, and commands are those of a family: give the drive")
+        raise BadArgument(
+            f"unit {units[0]} is no drive that is known, and commands are those of a family: give the drive"
+        )
     if any(function in network_rights.WRITES for function in functions) and not (write or commands):
         raise BadArgument("functions that write need what may be written, and nothing is named")
     for drive in drives:
@@ -241,7 +243,7 @@ def _halts(allow: Sequence[Allow]) -> Iterator[network_rights.Halts]:
                 halts = network_rights.halts_of(unit_of(drive))
                 if not halts.ways and network_rights.moves(network_rights.of_drive(unit_of(drive), (), each.commands)):
                     raise BadArgument(
-                        f"nothing is known that halts {drive.profile.title}, so clients may not move it; nothing listens",
+                        f"nothing is known that halts {drive.profile.title}, so no client may move it; nothing listens",
                         unit=drive.unit,
                     )
                 yield halts
@@ -254,7 +256,9 @@ def _functions(allow: Allow, writes: bool) -> list[int]:
     functions = [checks.whole("function", each, 1, 16) for each in _listed("functions", allow.functions)]
     for function in functions:
         if function not in allowed:
-            raise BadArgument(f"function {function} cannot be allowed; allowed are {', '.join(map(str, sorted(allowed)))}")
+            raise BadArgument(
+                f"function {function} cannot be allowed; allowed are {', '.join(map(str, sorted(allowed)))}"
+            )
     return functions
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import socket
 import struct
+import threading
+from collections.abc import Callable
 
 from drivebus import Gateway
 
@@ -33,6 +35,12 @@ def answer(client: socket.socket) -> tuple[int, int, bytes]:
     transaction, protocol, length, unit = struct.unpack(">HHHB", exactly(client, 7))
     assert protocol == 0
     return transaction, unit, exactly(client, length - 1)
+
+
+def seen(condition: Callable[[], bool]) -> None:
+    """Waits, in the time of other threads, until *condition* holds."""
+    while not condition():
+        threading.Event().wait(0.001)
 
 
 def is_cut_off(client: socket.socket) -> bool:

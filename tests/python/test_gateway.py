@@ -27,7 +27,7 @@ import drivebus
 from drivebus import Bus, Gateway, Simulator
 
 from .conftest import NO_PTY
-from .tcp_client import HERE, answer, connected, is_cut_off, request
+from .tcp_client import HERE, answer, connected, is_cut_off, request, seen
 
 IS = 0x01A0
 """What a GD350 answers at 2103H."""
@@ -102,7 +102,7 @@ def test_nothing_but_reads_gets_through(gateway: Gateway, simulator: Simulator) 
     assert not simulator.drive(1).take_writes()
     assert not simulator.drive(2).take_writes()
     told = gateway.told()
-    assert "may only read units 1 to 247, and asked unit 1: 06 20 00 00 01" in told[0]
+    assert "may not write 1 to 2000H of unit 1 by function 06H: refused 06 20 00 00 01" in told[0]
     assert gateway.stats.refused == len(told) == 3 + 124 + 1 + 9
 
 
@@ -175,12 +175,6 @@ def test_one_that_asks_too_much_is_told_busy_and_the_rest_is_answered(gateway: G
     assert {pdu for _, _, pdu in came} <= {b"\x03\x02\x01\xa0", b"\x83\x06", b"\x83\x0b"}
     stats = gateway.stats
     assert stats.requests == count == stats.answered + stats.busy + stats.late + stats.failed
-
-
-def seen(condition: Callable[[], bool]) -> None:
-    """Waits, in the time of other threads, until *condition* holds."""
-    while not condition():
-        threading.Event().wait(0.001)
 
 
 def test_what_is_not_sent_when_its_client_hangs_up_is_never_sent() -> None:
@@ -345,7 +339,10 @@ def test_the_command_shares_a_line_and_tells_what_it_refused() -> None:
         with socket.create_connection((host, int(port)), timeout=20) as client:
             client.sendall(request(1, 1, b"\x03\x21\x03\x00\x01") + request(2, 1, b"\x06\x20\x00\x00\x01"))
             assert {answer(client), answer(client)} == {(1, 1, b"\x03\x02\x01\xa0"), (2, 1, b"\x86\x01")}
-            assert "may only read units 1 to 247, and asked unit 1: 06 20 00 00 01" in program.stderr.readline()
+            assert (
+                "may not write 1 to 2000H of unit 1 by function 06H: refused 06 20 00 00 01"
+                in program.stderr.readline()
+            )
         program.send_signal(signal.SIGINT)
         counts = json.loads(program.stdout.readline())
         assert program.wait() == 0

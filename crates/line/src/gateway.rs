@@ -15,9 +15,9 @@
 //! | `clients` | how many there may be, and who gives way |
 //! | `audit`, `counts` | what they wrote, and what happened |
 //! | `together` | reads that wait, and who waits for the same |
-//! | `common` | what all connections have in common |
+//! | `common`, `connection` | what all connections have in common, and one of them |
 //! | `writing` | one write on its way |
-//! | `mailbox`, `connection`, `clerk` | the two threads of each |
+//! | `mailbox`, `reader`, `clerk` | the two threads of each |
 //!
 //! Source: *Modbus Messaging on TCP/IP Implementation Guide* V1.0b, §3.1.3 and §4.4.
 
@@ -31,6 +31,7 @@ mod counts;
 mod desk;
 mod mailbox;
 mod network;
+mod reader;
 mod requests;
 mod rights;
 mod together;
@@ -254,6 +255,6 @@ impl Door {
         self.common.counts.let_in();
         let peer = SocketAddr::new(host, peer.port());
         let common = Arc::clone(&self.common);
-        connection::serve(Connection { common, seat, peer, name: peer.to_string(), place, stream })
+        reader::serve(Connection { common, seat, peer, name: peer.to_string(), place, stream })
     }
 }

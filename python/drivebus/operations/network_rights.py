@@ -61,8 +61,8 @@ def of_unit(unit: int, addresses: Iterable[object]) -> list[Writable]:
         families = commanded_at(address)
         if families is not None:
             raise BadArgument(
-                f"{tables.shown(address)} of unit {unit} may command a motor: it is the command register of {families}. "
-                "Give the drive itself, with its profile, and name commands"
+                f"{tables.shown(address)} of unit {unit} may command a motor: it is the command register of "
+                f"{families}. Give the drive itself, with its profile, and name commands"
             )
         writes.append(("holding", address, None, "sets", None, tables.shown(address), None))
     return writes
@@ -133,7 +133,8 @@ def _register(unit: DriveView, name: object, means: str = "sets") -> Iterator[Wr
     profile = unit.profile
     if not isinstance(name, str):
         raise BadArgument(
-            f"a register of a drive is named by its name or code, and {checks.shown(name)} is neither", unit=unit.address
+            f"a register of a drive is named by its name or code, and {checks.shown(name)} is neither",
+            unit=unit.address,
         )
     unit.evidence.require_writable(name)
     known = profile.describe(name)

@@ -284,22 +284,24 @@ impl Clerk {
             self.on_their_way.remove(&number);
             return self.answer(number, &result);
         };
+        let common = &self.connection.common;
         match writing.steps.last() {
-            Some(Step::Look(_) | Step::Old(_)) => {
-                let is_look = matches!(writing.steps.last(), Some(Step::Look(_)));
-                let common = &self.connection.common;
-                match writing.came(&result) {
-                    Ok(()) if is_look => common.seen.take(writing.unit, writing.opening),
-                    Ok(()) => {}
-                    Err(failed) => {
-                        if is_look && result.is_ok() {
-                            common.counts.another(self.connection.peer, writing.unit);
-                        }
-                        return self.not_sent(number, failed);
-                    }
+            Some(Step::Look(_)) => match writing.looked(&result) {
+                Ok(said)
+                    if !writing.others.contains(&said) && common.seen.is_same(writing.unit, writing.opening, &said) =>
+                {
+                    self.go_on(number, mailbox)
                 }
-                self.go_on(number, mailbox)
-            }
+                Ok(_) => {
+                    common.counts.another(self.connection.peer, writing.unit);
+                    self.not_sent(number, Failed::before(ExceptionCode::GATEWAY_TARGET_SILENT))
+                }
+                Err(failed) => self.not_sent(number, failed),
+            },
+            Some(Step::Old(_)) => match writing.read(&result) {
+                Ok(()) => self.go_on(number, mailbox),
+                Err(failed) => self.not_sent(number, failed),
+            },
             Some(Step::Go) | None => {
                 // Nobody answers for all units: the client hears that it went out, by what a unit would say.
                 let echo = writing.pdu.get(..5).map(<[u8]>::to_vec).unwrap_or_default();

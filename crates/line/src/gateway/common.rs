@@ -1,7 +1,7 @@
 //! What all connections of a gateway have in common.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;
 
 use crate::bus::Bus;
@@ -84,19 +84,46 @@ impl Wills for WillsOf<'_> {
     }
 }
 
-/// Which units were asked who they are, since the port was opened last.
+/// What the units said of who they are.
 #[derive(Debug, Default)]
 pub(super) struct Seen {
-    /// By unit, the count of openings.
-    units: Mutex<BTreeMap<u8, u64>>,
+    /// By unit, what it said first, and at which opening of the port it was asked last.
+    units: Mutex<BTreeMap<u8, (Vec<u8>, u64)>>,
 }
 
 impl Seen {
-    pub(super) fn has(&self, unit: u8, opening: u64) -> bool {
-        self.units.lock().unwrap_or_else(PoisonError::into_inner).get(&unit) == Some(&opening)
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<u8, (Vec<u8>, u64)>> {
+        self.units.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(super) fn take(&self, unit: u8, opening: u64) {
-        self.units.lock().unwrap_or_else(PoisonError::into_inner).insert(unit, opening);
+    /// Whether `unit` was asked at this `opening` of the port.
+    pub(super) fn has(&self, unit: u8, opening: u64) -> bool {
+        self.lock().get(&unit).is_some_and(|(_, last)| *last == opening)
+    }
+
+    /// Whether `unit`, which `said` that at this `opening`, is the one that it was.
+    pub(super) fn is_same(&self, unit: u8, opening: u64, said: &[u8]) -> bool {
+        let mut units = self.lock();
+        let (first, last) = units.entry(unit).or_insert_with(|| (said.to_vec(), opening));
+        let is_same = *first == said;
+        if is_same {
+            *last = opening;
+        }
+        is_same
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_is_asked_once_an_opening_and_is_who_it_said_first() {
+        let seen = Seen::default();
+        assert!(!seen.has(1, 0));
+        assert!(seen.is_same(1, 0, &[3, 2, 1, 0xA0]) && seen.has(1, 0) && !seen.has(1, 1));
+        assert!(!seen.is_same(1, 1, &[0x83, 2]) && !seen.has(1, 1), "it is asked again");
+        assert!(seen.is_same(1, 2, &[3, 2, 1, 0xA0]) && seen.has(1, 2));
+        assert!(seen.is_same(2, 2, &[0x83, 2]), "one that refuses to tell is known by that");
     }
 }

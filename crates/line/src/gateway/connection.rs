@@ -1,30 +1,15 @@
-//! One connection: a thread that reads, and one of the clerk, who asks the line and writes the answers.
+//! One connection: whose it is, and what it has to do with all others.
 
-use std::io::{ErrorKind, Read as _};
-use std::net::{Shutdown, SocketAddr, TcpStream};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
 use crate::bus::programs::Seat;
-use crate::gateway::clerk::Clerk;
 use crate::gateway::clients::{Place, Stream};
 use crate::gateway::common::{Common, WillsOf};
-use crate::gateway::desk::Desk;
-use crate::gateway::mailbox::Mailbox;
-use crate::gateway::requests::Requests;
-use crate::system::clock::monotonic;
 
-/// Requests of one connection on their way to the line.
-pub(super) const IN_FLIGHT: usize = 16;
 /// How long a request may take to come whole, and a client to take an answer.
 pub(super) const HURRY: Duration = Duration::from_secs(1);
-/// How long a connection stays open that asks nothing.
-const IDLE: Duration = Duration::from_secs(60);
-/// Bytes of answers that the system keeps for a client which does not read: more than those of all its requests on their way.
-#[cfg(unix)]
-const UNREAD: usize = 16_384;
-/// What is read at a time.
-const CHUNK: usize = 4_096;
 
 /// What both threads of a connection have.
 pub(super) struct Connection {
@@ -47,93 +32,4 @@ impl Connection {
     pub(super) fn gone(&self, why: &str) {
         self.common.gone(self.place.number, &self.name, why);
     }
-}
-
-/// Serves the other end of `stream` to its end.
-///
-/// # Errors
-///
-/// The system's: it gives no thread.
-pub(super) fn serve(connection: Connection) -> std::io::Result<()> {
-    let stream = Arc::clone(&connection.stream);
-    // An answer is one small message, and its client waits for it.
-    stream.set_nodelay(true)?;
-    stream.set_write_timeout(Some(HURRY))?;
-    #[cfg(unix)]
-    rustix::net::sockopt::set_socket_send_buffer_size(&**stream, UNREAD)?;
-    let mailbox = Arc::new(Mailbox::default());
-    let reader = Arc::clone(&stream);
-    let letters = Arc::clone(&mailbox);
-    std::thread::Builder::new().name("drivebus-tcp-in".to_owned()).spawn(move || {
-        let why = read(&reader, &letters);
-        letters.end(why);
-    })?;
-    let (letters, end) = (Arc::clone(&mailbox), Arc::clone(&stream));
-    let desk = std::thread::Builder::new().name("drivebus-tcp".to_owned());
-    let spawned = desk.spawn(move || {
-        let desk = Desk::new(connection.common.within, IN_FLIGHT);
-        let why = Clerk::new(connection, desk).work(&stream, &letters);
-        letters.end(why);
-        // The reader waits there.
-        let _ = stream.shutdown(Shutdown::Both);
-    });
-    if spawned.is_err() {
-        mailbox.end(String::new());
-        let _ = end.shutdown(Shutdown::Both);
-    }
-    spawned.map(drop)
-}
-
-/// Reads requests until the connection ends; why it does, for people, empty where the client ended it.
-fn read(stream: &TcpStream, mailbox: &Mailbox) -> String {
-    let mut requests = Requests::default();
-    let mut bytes = [0; CHUNK];
-    // When what is there began: the request that is not whole, or the time without one.
-    let mut since = monotonic();
-    loop {
-        let limit = if requests.has_begun() { HURRY } else { IDLE };
-        let left = (since + limit).saturating_duration_since(monotonic());
-        let came = if left.is_zero() { Err(ErrorKind::TimedOut.into()) } else { read_within(stream, left, &mut bytes) };
-        match came {
-            Ok(0) => return String::new(),
-            Ok(count) => {
-                let now = monotonic();
-                let had_begun = requests.has_begun();
-                let mut asked_any = false;
-                let mut is_heard = true;
-                let taken = requests.take(&bytes[..count], |asked| {
-                    asked_any = true;
-                    is_heard = is_heard && mailbox.ask(asked, now);
-                });
-                if let Err(wrong) = taken {
-                    return wrong.to_string();
-                }
-                if !is_heard {
-                    return String::new();
-                }
-                if asked_any || !had_begun {
-                    // From when this is read on: what the client had to wait for room is not its delay.
-                    since = monotonic();
-                }
-            }
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
-                if monotonic() < since + limit {
-                    continue;
-                }
-                return if requests.has_begun() {
-                    format!("a request that was not whole within {} s", HURRY.as_secs())
-                } else {
-                    format!("no request for {} s", IDLE.as_secs())
-                };
-            }
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(_) => return String::new(),
-        }
-    }
-}
-
-fn read_within(mut stream: &TcpStream, left: Duration, bytes: &mut [u8]) -> std::io::Result<usize> {
-    // The system takes no time-out below its own grain.
-    stream.set_read_timeout(Some(left.max(Duration::from_millis(1))))?;
-    stream.read(bytes)
 }

@@ -4,7 +4,7 @@ use std::net::TcpStream;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use drivebus_rtu::{Destination, ExceptionCode, Instant};
+use drivebus_rtu::{Destination, Instant};
 
 use crate::bus::workers::Running;
 use crate::gateway::audit::{Entry, Outcome};
@@ -45,21 +45,27 @@ pub(super) struct Writing {
 }
 
 impl Writing {
-    /// A read that came before it ended: whether it goes on, or what the client is told.
-    pub(super) fn came(&mut self, result: &Result<Vec<u8>, Failed>) -> Result<(), Failed> {
-        let step = self.steps.pop();
-        match (step, result) {
-            (Some(Step::Look(_)), Ok(pdu)) if self.others.contains(pdu) => {
-                Err(Failed::before(ExceptionCode::GATEWAY_TARGET_SILENT))
-            }
-            (Some(Step::Old(_)), Ok(pdu)) => {
-                self.record.replaces(words_of(pdu));
-                Ok(())
-            }
-            // A unit that cannot show it may take it all the same, and a refusal is no evidence of who it is.
-            (_, Err(failed)) if !failed.is_by_unit => Err(Failed { may_have_acted: false, ..*failed }),
-            _ => Ok(()),
+    /// The unit was asked who it is: what it said, or what the client is told where that tells nothing.
+    pub(super) fn looked(&mut self, result: &Result<Vec<u8>, Failed>) -> Result<Vec<u8>, Failed> {
+        self.steps.pop();
+        match result {
+            Ok(pdu) => Ok(pdu.clone()),
+            // Who does not know the register, or the function, is known by that. Whatever else it refuses for may pass.
+            Err(failed) if failed.is_by_unit && (0x01..=0x03).contains(&failed.code.0) => Ok(vec![failed.code.0]),
+            Err(failed) => Err(Failed { may_have_acted: false, ..*failed }),
         }
+    }
+
+    /// What it replaces was read; `Err`: what the client is told where the line did not bring that.
+    pub(super) fn read(&mut self, result: &Result<Vec<u8>, Failed>) -> Result<(), Failed> {
+        self.steps.pop();
+        match result {
+            Ok(pdu) => self.record.replaces(words_of(pdu)),
+            // A unit that cannot show it may take it all the same.
+            Err(failed) if failed.is_by_unit => {}
+            Err(failed) => return Err(Failed { may_have_acted: false, ..*failed }),
+        }
+        Ok(())
     }
 
     /// It is not wanted any more: what has not gone out does not.
