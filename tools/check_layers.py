@@ -89,7 +89,7 @@ ROOMS: list[set[str]] = [
     {"bus"},
     {"line_search"},
     {"aio", "doctor", "gateway", "hal", "sniffer", "record", "trial"},
-    {"plot"},
+    {"plot", "service"},
     {"__init__"},
 ]
 
@@ -133,6 +133,7 @@ USERS: dict[str, set[str]] = {
         "record",
         "rtu",
         "sim",
+        "service",
         "site",
         "sniffer",
         "trial",

@@ -226,7 +226,7 @@ def _rules(allow: Allow, bus: Bus) -> Iterator[_Rule]:
         unit = unit_of(drive)
         if write or commands:
             network_rights.is_what_it_should_be(unit)
-        yield networks, [drive.unit], functions, network_rights.of_drive(unit, write, commands)
+        yield networks, [drive.unit], functions, network_rights.of_drive(unit.evidence, write, commands)
     for number in units:
         yield networks, [number], functions, network_rights.of_unit(number, write)
     if not allow.drives:
@@ -241,7 +241,9 @@ def _halts(allow: Sequence[Allow]) -> Iterator[network_rights.Halts]:
             if isinstance(drive, Drive) and drive.unit not in known:
                 known.add(drive.unit)
                 halts = network_rights.halts_of(unit_of(drive))
-                if not halts.ways and network_rights.moves(network_rights.of_drive(unit_of(drive), (), each.commands)):
+                if not halts.ways and network_rights.moves(
+                    network_rights.of_drive(unit_of(drive).evidence, (), each.commands)
+                ):
                     raise BadArgument(
                         f"nothing is known that halts {drive.profile.title}, so no client may move it; nothing listens",
                         unit=drive.unit,

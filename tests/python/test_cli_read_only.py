@@ -99,6 +99,6 @@ def test_a_switch_that_is_off_refuses_nothing(simulator: drivebus.Simulator) -> 
 
 def test_every_command_is_known_to_write_or_not() -> None:
     """A command that is added has to be put into one of the two."""
-    looks = {"plot", "ports", "drives", "list", "doctor", "decode", "sniff", "replay", "share"}
+    looks = {"plot", "ports", "drives", "list", "doctor", "decode", "sniff", "replay", "share", "serve"}
     elsewhere = looks | {"panel", "sim", "profiles", "completion", "demo"}
     assert {words[0] for words in [*WRITING, *LOOKING]} | elsewhere == set(cli.commands)

@@ -100,6 +100,7 @@ COMMANDS: dict[str, tuple[list[str], int]] = {
     "sniff": (["--port", ONE, "sniff", "--for", "1"], 0),
     "replay": (["replay", "line.pcapng"], 0),
     "share": (["--port", ONE, "share", "--tcp", "127.0.0.1:0"], 0),
+    "serve": (["serve", "--check"], 0),
     "hal": (["--port", ONE, "hal", "--rpm-per-hz", "60", "--hal-path", "."], 2),
     "completion": (["completion", "bash"], 0),
     "nobody answers": (["--port", ONE, "--unit", "9", "status"], 3),

@@ -35,7 +35,7 @@ GROUPS: dict[str, dict[str, tuple[str, ...]]] = {
         "commands.profiles": ("profiles",),
     },
     "Listen": {"commands.sniff": ("sniff",), "commands.replay": ("replay",)},
-    "Machines": {"commands.hal": ("hal",), "commands.share": ("share",)},
+    "Machines": {"commands.hal": ("hal",), "commands.share": ("share",), "commands.serve": ("serve",)},
     "Tools": {
         "raw": ("raw",),
         "commands.decode": ("decode",),

@@ -15,7 +15,7 @@ from drivebus.line.blocking import at_once
 from drivebus.line.write_guard import commanded_at
 from drivebus.operations import last_will
 from drivebus.operations.drive_view import DriveView
-from drivebus.operations.setpoints import register_of
+from drivebus.profile.evidence import Evidence
 
 __all__ = ["READS", "WRITES", "Halts", "Writable", "halts_of", "is_what_it_should_be", "moves", "of_drive", "of_unit"]
 
@@ -68,20 +68,20 @@ def of_unit(unit: int, addresses: Iterable[object]) -> list[Writable]:
     return writes
 
 
-def of_drive(unit: DriveView, registers: Iterable[object], commands: Iterable[object]) -> list[Writable]:
-    """The *registers* and *commands* of a drive by name.
+def of_drive(evidence: Evidence, registers: Iterable[object], commands: Iterable[object]) -> list[Writable]:
+    """The *registers* and *commands* of a drive by name, as far as its family is *evidence* of them. It is not asked.
 
     Raises:
         NotAllowed: One is unknown, or not verified for the family.
     """
-    writes = [write for name in registers for write in _register(unit, name)]
-    return writes + [write for name in commands for write in _command(unit, name)]
+    writes = [write for name in registers for write in _register(evidence, name)]
+    return writes + [write for name in commands for write in _command(evidence, name)]
 
 
 def halts_of(unit: DriveView) -> Halts:
     """How *unit* is halted; without ways where no document proves one."""
     usable = [name for name in _STOPS if unit.evidence.unusable(name) is None]
-    stops = [write for name in usable for write in _code(unit, name, "stops")]
+    stops = [write for name in usable for write in _code(unit.evidence, name, "stops")]
     ways = [last_will.requests_of(unit.profile, way) for way in last_will.WAYS if way in usable]
     look = None if unit.identity.trusted else last_will.look_of(unit.profile)
     return Halts(unit.address, stops, ways, look)
@@ -100,54 +100,60 @@ def is_what_it_should_be(unit: DriveView) -> None:
         return
 
 
-def _command(unit: DriveView, name: object) -> Iterator[Writable]:
-    profile = unit.profile
-    known = {*profile.commands(), *_GROUPS, "setpoint", *profile.setpoint_names()}
+def _command(evidence: Evidence, name: object) -> Iterator[Writable]:
+    profile = evidence.profile
+    known = {*profile.commands(), *_GROUPS, *profile.setpoint_names()}
+    known |= {"setpoint"} if "frequency" in known else set()
     if not isinstance(name, str) or name not in known:
         hint = checks.closest(name, known) if isinstance(name, str) else ""
-        raise BadArgument(f"{checks.shown(name)} is no command or setpoint of {profile.title}{hint}", unit=unit.address)
+        raise BadArgument(
+            f"{checks.shown(name)} is no command or setpoint of {profile.title}{hint}", unit=evidence.unit
+        )
     if name == "setpoint" or name in profile.setpoint_names():
         setpoint = "frequency" if name == "setpoint" else name
-        yield from _register(unit, register_of(unit, setpoint), "moves" if setpoint in _MOVES else "sets")
+        register = profile.role(f"setpoints.{setpoint}")
+        yield from _register(evidence, register)
         return
     # Some families know one direction only.
     for command in [each for each in _GROUPS.get(name, (name,)) if each == name or each in profile.commands()]:
-        unit.evidence.require_command(command)
+        evidence.require_command(command)
         means = "stops" if command in _STOPS else "sets" if command == "reset_fault" else "moves"
-        yield from _code(unit, command, means)
+        yield from _code(evidence, command, means)
         if means == "moves":
             place = profile.command(command)[0]
             for step in profile.start_sequence():
                 yield _at(place, [step.word], "sets", step.label)
 
 
-def _code(unit: DriveView, command: str, means: str) -> Iterator[Writable]:
-    place, code = unit.profile.command(command)
+def _code(evidence: Evidence, command: str, means: str) -> Iterator[Writable]:
+    place, code = evidence.profile.command(command)
     yield _at(place, [code], means, command)
-    first = unit.profile.command_first(command)
+    first = evidence.profile.command_first(command)
     if first is not None:
         yield _at(first[0], [first[1]], "sets", command)
 
 
-def _register(unit: DriveView, name: object, means: str = "sets") -> Iterator[Writable]:
-    profile = unit.profile
+def _register(evidence: Evidence, name: object) -> Iterator[Writable]:
+    profile = evidence.profile
+    means = "sets"
     if not isinstance(name, str):
         raise BadArgument(
             f"a register of a drive is named by its name or code, and {checks.shown(name)} is neither",
-            unit=unit.address,
+            unit=evidence.unit,
         )
-    unit.evidence.require_writable(name)
+    evidence.require_writable(name)
     known = profile.describe(name)
     called = known.code or known.name
     if known.access == "ro":
-        raise BadArgument(f"{called} of {profile.title} can only be read", unit=unit.address)
+        raise BadArgument(f"{called} of {profile.title} can only be read", unit=evidence.unit)
     place = profile.address(name)
     if profile.is_command(place):
         raise BadArgument(
             f"{called} of {profile.title} takes commands: name those that are allowed among the commands",
-            unit=unit.address,
+            unit=evidence.unit,
         )
-    if called in profile.acts() or name in profile.acts():
+    started_by = [profile.role(f"setpoints.{setpoint}") for setpoint in _MOVES]
+    if {called, name} & {*profile.acts(), *started_by}:
         means = "moves"
     shown = profile.read_back(name)
     shown_at = shown if shown is not None and known.kind == "parameter" and shown <= 0xFFFF else None

@@ -5,15 +5,20 @@ from typing import TYPE_CHECKING
 from drivebus.lazy_names import later
 
 if TYPE_CHECKING:
-    from drivebus.site.config import FILE, Site, SiteDrive, SiteLine
+    from drivebus.site.config import FILE, Site
+    from drivebus.site.entries import SiteDrive, SiteLine
     from drivebus.site.known_families import families_on, forget, known_family, remember
+    from drivebus.site.share import SiteAllow, SiteShare, SiteTcp
     from drivebus.site.state_folder import state_file
 
 __all__ = [
     "FILE",
     "Site",
+    "SiteAllow",
     "SiteDrive",
     "SiteLine",
+    "SiteShare",
+    "SiteTcp",
     "families_on",
     "forget",
     "known_family",
@@ -25,8 +30,10 @@ if not TYPE_CHECKING:
     __getattr__ = later(
         __name__,
         {
-            "config": ("FILE", "Site", "SiteDrive", "SiteLine"),
+            "config": ("FILE", "Site"),
+            "entries": ("SiteDrive", "SiteLine"),
             "known_families": ("families_on", "forget", "known_family", "remember"),
+            "share": ("SiteAllow", "SiteShare", "SiteTcp"),
             "state_folder": ("state_file",),
         },
     )

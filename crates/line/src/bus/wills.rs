@@ -472,14 +472,17 @@ impl Wills {
         let mut state = self.lock();
         let halted = state.halting.remove(&unit);
         self.halts.store(!state.halting.is_empty(), Ordering::Release);
-        let who = format!("{} (process {}), which ran it, is gone", will.program, will.process);
-        state.note(&if took {
-            format!("unit {unit} was told to halt, and took it: {who}")
-        } else {
-            format!("unit {unit} was not told to halt: {who}, and another drive answers at its address now")
-        });
+        let wills = halted.map(|halted| halted.wills).unwrap_or_default();
+        if wills.iter().any(|left| left.then.is_none()) {
+            let who = format!("{} (process {}), which ran it, is gone", will.program, will.process);
+            state.note(&if took {
+                format!("unit {unit} was told to halt, and took it: {who}")
+            } else {
+                format!("unit {unit} was not told to halt: {who}, and another drive answers at its address now")
+            });
+        }
         drop(state);
-        for Left { paper, then, .. } in halted.into_iter().flat_map(|halted| halted.wills) {
+        for Left { paper, then, .. } in wills {
             if let Some(paper) = paper {
                 paper.remove();
             }

@@ -1,0 +1,82 @@
+"""`drivebus serve`: the lines of `drivebus.toml` as a service, for programs and for clients over the network."""
+
+from __future__ import annotations
+
+import signal
+from contextlib import suppress
+from types import FrameType
+from typing import Any
+
+import click
+
+from drivebus.cli.drive_selection import find_site
+from drivebus.cli.option_types import Seconds
+from drivebus.cli.present.output import counted, remark
+from drivebus.cli.session import Session, pass_session
+from drivebus.cli.wrong_use import WrongUse
+from drivebus.end_signals import END_SIGNALS
+
+__all__ = ["COMMANDS"]
+
+
+@click.command()
+@click.option("--check", "checks", is_flag=True, help="Say what is wrong in the file, and end. Nothing is opened.")
+@click.option("--status", "shows", is_flag=True, help="Say how the service does that runs, and end.")
+@click.option("--for", "duration", type=Seconds(0), metavar="SECONDS", help="Stop after so long.")
+@click.pass_context
+@pass_session
+def serve(session: Session, context: click.Context, checks: bool, shows: bool, duration: float | None) -> None:
+    """Serve the lines of drivebus.toml, until Ctrl-C or SIGTERM: for a service.
+
+    Other programs use the lines through it, and clients of Modbus TCP as [[share.tcp]] says. What happens is told on
+    standard error. A motor that a client set in motion is halted when the service ends.
+    """
+    from drivebus import service
+
+    if checks and shows:
+        raise WrongUse("--check looks at the file and --status at the service: give one of them")
+    site = find_site(context.find_root().params.get("config"), needed=True)
+    if shows:
+        _show(session, service.read_status(site))
+        return
+    if not site.lines:
+        raise WrongUse(f"{site.path} has no lines to serve: name them as [lines.NAME]")
+    if checks:
+        service.check(site)
+        share = site.share
+        session.out.record({"file": str(site.path), "lines": len(site.lines), "tcp": len(share.tcp)})
+        session.out.say(f"{site.path}: {counted(len(site.lines), 'line')}, {len(share.tcp)} at Modbus TCP: no mistake")
+        return
+    served = service.Service(site, remark)
+
+    def end(_number: int, _frame: FrameType | None) -> None:
+        served.end()
+
+    for number in [*END_SIGNALS, signal.SIGINT]:
+        signal.signal(number, end)
+    with suppress(KeyboardInterrupt):
+        served.run(duration)
+
+
+def _show(session: Session, status: dict[str, Any]) -> None:
+    session.out.record(status)
+    session.out.say(f"process {status['process']}, at {status['time']}")
+    for name, line in status["lines"].items():
+        if not line["open"]:
+            session.out.say(f"{name}: {line['port']} is away: {line['why']}")
+            continue
+        session.out.say(
+            f"{name}: {line['port']}, {counted(line['requests'], 'request')}, {line['timeouts']} without an answer, "
+            f"{counted(len(line['programs']), 'program')}"
+        )
+        for address, of in line["tcp"].items():
+            session.out.say(
+                f"{name}: {address}, {counted(of['clients'], 'client')}, {counted(of['requests'], 'request')}: "
+                f"{of['answered']} answered, {of['failed']} failed, {of['late']} late, {of['refused']} refused, "
+                f"{of['written']} written, {of['halted']} halted"
+            )
+        for hint in line["hints"]:
+            session.out.say(f"{name}: {hint}")
+
+
+COMMANDS = [serve]

@@ -1,0 +1,15 @@
+"""The lines of a site, served: to the programs of a computer, and to clients over the network, as its file says."""
+
+from typing import TYPE_CHECKING
+
+from drivebus.lazy_names import later
+
+if TYPE_CHECKING:
+    from drivebus.service.check import check
+    from drivebus.service.serving import Service
+    from drivebus.service.status import read_status
+
+__all__ = ["Service", "check", "read_status"]
+
+if not TYPE_CHECKING:
+    __getattr__ = later(__name__, {"check": ("check",), "serving": ("Service",), "status": ("read_status",)})

@@ -1,0 +1,93 @@
+"""What is wrong in what a site says of sharing, beyond its form: registers and commands, by the families of the drives.
+
+Nothing is opened, and nothing is sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from drivebus.errors import BadArgument, NotAllowed
+from drivebus.operations import network_rights
+from drivebus.operations.last_will import WAYS
+from drivebus.profile import Profile
+from drivebus.profile.evidence import Evidence
+from drivebus.site import Site, SiteAllow, SiteDrive, SiteTcp
+
+__all__ = ["check"]
+
+
+def check(site: Site) -> None:
+    """Looks through what *site* says of clients over the network.
+
+    Raises:
+        NotAllowed: Something cannot be; each mistake is named with its line.
+    """
+    wrong = {mistake for tcp in site.share.tcp for mistake in _of_address(tcp)}
+    if wrong:
+        count = "one mistake" if len(wrong) == 1 else f"{len(wrong)} mistakes"
+        told = [f"{site.path}:{line}: {reason}" for line, reason in sorted(wrong)]
+        raise BadArgument("\n".join([f"{site.path} has {count}; nothing was opened:", *told]))
+
+
+def _of_address(tcp: SiteTcp) -> Iterator[tuple[int, str]]:
+    moved: list[str] = []
+    for allow in tcp.allow:
+        yield from _of_rule(allow, moved)
+    if moved and tcp.dead_man is None:
+        yield (
+            tcp.at,
+            f"clients may move {moved[0]}, and nothing says what becomes of it when they are gone: say dead_man, "
+            'seconds after which it is halted, or "off" if it shall run on',
+        )
+
+
+def _of_rule(allow: SiteAllow, moved: list[str]) -> Iterator[tuple[int, str]]:
+    """What is wrong in one rule; drives that it lets clients move are *moved*."""
+    at = allow.lines[""]
+    if (allow.write or allow.commands) and not (allow.drives or allow.units):
+        yield at, "what may be written is said of drives that are named: say drives"
+    if allow.functions and set(allow.functions) & set(network_rights.WRITES) and not (allow.write or allow.commands):
+        yield allow.lines["functions"], "functions that write need what may be written, and nothing is named"
+    if allow.commands and allow.units:
+        yield allow.lines["units"], "a unit that is no drive knows no commands: name a drive"
+    for unit in allow.units:
+        try:
+            network_rights.of_unit(unit, allow.write)
+        except NotAllowed as error:
+            yield allow.lines["write"], str(error)
+    for drive in allow.drives:
+        if allow.write or allow.commands:
+            yield from _of_drive(allow, drive, moved)
+
+
+def _of_drive(allow: SiteAllow, drive: SiteDrive, moved: list[str]) -> Iterator[tuple[int, str]]:
+    at = allow.lines["drives"]
+    if drive.profile is None:
+        yield at, f'"{drive.name}" has no profile, and who writes to it needs one: say it in [drives.{drive.name}]'
+        return
+    if drive.read_only:
+        yield at, f'"{drive.name}" is read_only'
+        return
+    try:
+        profile = Profile.find(drive.profile)
+        profile = profile.with_variants(drive.variants) if drive.variants else profile
+    except NotAllowed as error:
+        yield at, f'"{drive.name}": {error}'
+        return
+    evidence = Evidence(profile, drive.unit, drive.unverified)
+    moves = False
+    named: list[tuple[str, list[str | int], list[str]]] = [("write", [name], []) for name in allow.write] + [
+        ("commands", [], [name]) for name in allow.commands
+    ]
+    for key, registers, commands in named:
+        try:
+            writes = network_rights.of_drive(evidence, registers, commands)
+        except NotAllowed as error:
+            yield allow.lines[key], str(error)
+        else:
+            moves = moves or network_rights.moves(writes)
+    if moves:
+        moved.append(f'"{drive.name}"')
+        if all(evidence.unusable(way) is not None for way in WAYS):
+            yield at, f'nothing is known that halts "{drive.name}", so clients may not move it'

@@ -1,0 +1,223 @@
+"""Serves the lines of a site until it is told to end: each in a thread of its own, so that none waits for another."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from datetime import datetime, timezone
+from typing import Any
+
+from drivebus.bus import Bus
+from drivebus.drive import Drive
+from drivebus.errors import DrivebusError
+from drivebus.gateway import Allow, Gateway, GatewayStats
+from drivebus.latch import Latch
+from drivebus.service.check import check
+from drivebus.service.notify import notify, watchdog_interval
+from drivebus.service.status import StatusFile
+from drivebus.site import Site, SiteAllow, SiteDrive, SiteLine, SiteTcp
+
+__all__ = ["Service"]
+
+_LOOKS = 0.2
+"""Seconds between two looks at what happened."""
+
+_AGAIN = 1.0
+"""Seconds until a line that could not be opened is tried again."""
+
+_AT_ONCE = 5
+"""So much of what clients did wrong is told at a time: whoever floods a gateway shall not flood a log."""
+
+
+class Service:
+    """The service of one site.
+
+    Args:
+        site: What it serves.
+        tell: Hears in words what people should know, line by line.
+
+    Raises:
+        NotAllowed: Something in the file cannot be. Nothing was opened.
+    """
+
+    def __init__(self, site: Site, tell: Callable[[str], None]) -> None:
+        check(site)
+        self._site = site
+        self._tell = tell
+        self._over = Latch()
+        of_line = {name: [tcp for tcp in site.share.tcp if tcp.line == line] for name, line in site.lines.items()}
+        self._lines = [_Served(site, line, of_line[name], tell, self._over) for name, line in site.lines.items()]
+
+    def run(self, duration: float | None = None) -> None:
+        """Serves until `end` is called, or for *duration* seconds. What clients set in motion is halted then."""
+        status = StatusFile(self._site)
+        threads = [threading.Thread(target=line.run, name=f"line {line.name}") for line in self._lines]
+        try:
+            for thread in threads:
+                thread.start()
+            for line in self._lines:
+                line.tried.wait()
+            notify("READY=1")
+            self._watch(status, None if duration is None else time.monotonic() + duration)
+        finally:
+            notify("STOPPING=1")
+            self._over.set()
+            for thread in threads:
+                thread.join()
+            status.remove()
+
+    def end(self) -> None:
+        """Ends it: `run` returns when all is closed."""
+        self._over.set()
+
+    def _watch(self, status: StatusFile, until: float | None) -> None:
+        """Says how the service does, and that it lives: as long as each line has given somebody the turn meanwhile."""
+        interval, turns, pinged = watchdog_interval(), {line.name: -1 for line in self._lines}, 0.0
+        while not self._over.is_set() and (until is None or time.monotonic() < until):
+            status.write(self.status())
+            now = {line.name: line.turns for line in self._lines}
+            if interval is not None and time.monotonic() >= pinged + interval:
+                if all(now[name] != turns[name] for name in now):
+                    notify("WATCHDOG=1")
+                turns, pinged = now, time.monotonic()
+            left = _AGAIN if until is None else min(_AGAIN, max(until - time.monotonic(), 0.0))
+            self._over.wait(left if interval is None else min(left, interval / 2))
+
+    def status(self) -> dict[str, Any]:
+        """How it does: the time, its process, and of each line what `drivebus serve --status` shows."""
+        moment = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
+        return {
+            "time": moment,
+            "process": os.getpid(),
+            "file": str(self._site.path),
+            "lines": {line.name: line.status() for line in self._lines},
+        }
+
+
+class _Served:
+    """One line, opened again and again until the service ends."""
+
+    def __init__(
+        self, site: Site, line: SiteLine, tcp: list[SiteTcp], tell: Callable[[str], None], over: Latch
+    ) -> None:
+        self.name = line.name
+        self.turns = 0
+        """How often the line gave this program the turn, and how often that was tried where it is not there."""
+        self.tried = Latch()
+        """Closed when it was tried to open it."""
+        self._site, self._line, self._tcp = site, line, tcp
+        self._tell = tell
+        self._over = over
+        self._open: tuple[Bus, list[Gateway]] | None = None
+        self._why = ""
+
+    def run(self) -> None:
+        """Serves it until the service ends."""
+        while not self._over.is_set():
+            try:
+                with ExitStack() as stack:
+                    self._begin(stack)
+                    stack.callback(self._close)
+                    self.tried.set()
+                    self._serve()
+            except (DrivebusError, OSError) as error:
+                if str(error) != self._why:
+                    self._why = str(error)
+                    self._tell(f"{self.name}: {error}; tried again each second")
+                self.turns += 1
+                self.tried.set()
+                self._over.wait(_AGAIN)
+        self.tried.set()
+
+    def _begin(self, stack: ExitStack) -> None:
+        line = self._line
+        options: dict[str, Any] = {"reserved": line.reserved}
+        if line.baud is not None:
+            options["baudrate"] = line.baud
+        if line.format is not None:
+            bits, parity, stop = tuple(line.format)
+            options |= {"bytesize": int(bits), "parity": parity, "stopbits": int(stop)}
+        if line.rs485 is not None:
+            options["rs485"] = {"mode": line.rs485}
+        bus = stack.enter_context(Bus(line.port, **options))
+        gateways = [stack.enter_context(self._gateway(bus, tcp)) for tcp in self._tcp]
+        self._open, self._why = (bus, gateways), ""
+        at = ", ".join(gateway.address for gateway in gateways)
+        self._tell(f"{self.name}: {bus.port} is served{f' at {at}' if at else ''}")
+
+    def _gateway(self, bus: Bus, tcp: SiteTcp) -> Gateway:
+        drives: dict[str, Drive] = {}
+        allow = [_allowed(bus, each, drives) for each in tcp.allow]
+        audit = self._site.share.audit
+        within, dead_man = tcp.answer_within, tcp.dead_man
+        return Gateway(bus, tcp.address, answer_within=within, allow=allow, dead_man=dead_man, audit=audit)
+
+    def _close(self) -> None:
+        self._open = None
+
+    def _serve(self) -> None:
+        assert self._open is not None
+        bus, gateways = self._open
+        known: list[str] = []
+        while not self._over.is_set():
+            self._over.wait(_LOOKS)
+            told = [text for gateway in gateways for text in gateway.told()]
+            for text in told[:_AT_ONCE]:
+                self._tell(f"{self.name}: {text}")
+            if len(told) > _AT_ONCE:
+                self._tell(f"{self.name}: and {len(told) - _AT_ONCE} more like these")
+            stats = bus.stats()
+            notes = [*stats.notes, *stats.wills]
+            for text in notes:
+                if text not in known:
+                    self._tell(f"{self.name}: {text}")
+            known = notes
+            # Nothing is sent: whoever uses the line lets this one have its turn, or hangs.
+            with suppress(DrivebusError):
+                bus.listen(0.0)
+            self.turns += 1
+
+    def status(self) -> dict[str, Any]:
+        """How the line does."""
+        if self._open is None:
+            return {"port": self._line.port, "open": False, "why": self._why}
+        bus, gateways = self._open
+        stats = bus.stats()
+        return {
+            "port": bus.port,
+            "open": True,
+            "requests": stats.requests,
+            "answers": stats.answers,
+            "timeouts": stats.timeouts,
+            "reconnects": stats.reconnects,
+            "hints": stats.hints,
+            "programs": [program for program in stats.programs if program["here"]],
+            "tcp": {
+                gateway.address: dict(zip(GatewayStats.__annotations__, gateway.stats, strict=True))
+                for gateway in gateways
+            },
+        }
+
+
+def _allowed(bus: Bus, rule: SiteAllow, drives: dict[str, Drive]) -> Allow:
+    writes = bool(rule.write or rule.commands)
+
+    def drive_of(each: SiteDrive) -> Drive | int:
+        if not writes:
+            return each.unit
+        if each.name not in drives:
+            drives[each.name] = bus.drive(
+                each.unit, each.profile, unverified=each.unverified, variants=each.variants or None
+            )
+        return drives[each.name]
+
+    return Allow(
+        networks=rule.networks,
+        drives=[*(drive_of(each) for each in rule.drives), *rule.units],
+        functions=rule.functions,
+        write=rule.write,
+        commands=rule.commands,
+    )

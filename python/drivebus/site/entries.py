@@ -1,0 +1,59 @@
+"""The lines that one owns, and the drives on them, as a file names them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from drivebus.line.addresses import Addresses
+
+__all__ = ["SiteDrive", "SiteLine"]
+
+
+@dataclass(frozen=True)
+class SiteLine:
+    """A line with its settings; what is None is as usual.
+
+    Attributes:
+        name: What it is called.
+        port: What to open.
+        baud: Bits per second.
+        format: Data bits, parity and stop bits, such as `"8E1"`.
+        rs485: Who switches the direction: `"kernel"`, `"rts"` or `"auto"`.
+        reserved: Whether it has units that the specification reserves, as `drivebus.Bus` takes it.
+    """
+
+    name: str
+    port: str
+    baud: int | None = None
+    format: str | None = None
+    rs485: str | None = None
+    reserved: bool = False
+
+    @property
+    def addresses(self) -> Addresses:
+        """Which units it may have."""
+        return Addresses.of(self.port, reserved=self.reserved)
+
+
+@dataclass(frozen=True)
+class SiteDrive:
+    """A drive on one of the lines.
+
+    Attributes:
+        name: What it is called.
+        line: The line it hangs on.
+        unit: Its address, 1..247, or another that its line has.
+        profile: Its family, or the folder of a profile; None asks the drive.
+        variants: What parameters of the drive decide, by name.
+        unverified: Whether what no document of its family proves may be used.
+        read_only: Whether nothing may be written to it.
+    """
+
+    name: str
+    line: SiteLine
+    unit: int
+    profile: str | None = None
+    variants: Mapping[str, str] = field(default_factory=dict)
+    unverified: bool = False
+    read_only: bool = False

@@ -1,0 +1,221 @@
+"""Who may use the lines of a site: the users of a group, and clients over the network, as `drivebus serve` lets them.
+
+    [share]
+    group = "plant"
+
+    [[share.tcp]]
+    line = "hall"
+    address = "192.168.7.10:1502"
+    dead_man = 2.0
+
+    [[share.tcp.allow]]
+    networks = ["192.168.7.0/24"]
+    drives = ["pumps"]
+    commands = ["run", "setpoint"]
+
+Here it is read. What the names of registers and commands mean, and whether they may be allowed, the families know.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from drivebus import checks
+from drivebus.site.entries import SiteDrive, SiteLine
+from drivebus.site.reading import Key, Reading, Wrong, flag, listed, number, quoted, text, whole
+
+__all__ = ["SiteAllow", "SiteShare", "SiteTcp", "share_of"]
+
+_WITHIN, _DEAD_MAN = (0.05, 60.0), (0.1, 3600.0)
+"""Seconds, as `drivebus.Gateway` takes them."""
+
+
+@dataclass(frozen=True)
+class SiteAllow:
+    """What clients of some networks may do, as `drivebus.Allow` has it.
+
+    Attributes:
+        networks: Whose clients; none: everybody's.
+        drives: The drives.
+        units: Units that are no drives.
+        functions: Function codes; None: the usual ones.
+        write: Registers and parameters that may be written.
+        commands: Commands that may be given.
+        lines: In which line of the file each key stands, and the table itself by an empty name.
+    """
+
+    networks: tuple[str, ...] = ()
+    drives: tuple[SiteDrive, ...] = ()
+    units: tuple[int, ...] = ()
+    functions: tuple[int, ...] | None = None
+    write: tuple[str | int, ...] = ()
+    commands: tuple[str, ...] = ()
+    lines: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class SiteTcp:
+    """Where clients of Modbus TCP find a line, as `drivebus.Gateway` has it.
+
+    Attributes:
+        line: The line.
+        address: `host:port`.
+        answer_within: Seconds until an answer goes out at the latest.
+        dead_man: Seconds of silence after which a motor is halted, `"off"`, or None where it is not said.
+        allow: What clients may do; none: all may read.
+        at: In which line of the file its table begins.
+    """
+
+    line: SiteLine
+    address: str
+    answer_within: float = 1.0
+    dead_man: float | Literal["off"] | None = None
+    allow: tuple[SiteAllow, ...] = ()
+    at: int = 1
+
+
+@dataclass(frozen=True)
+class SiteShare:
+    """Who may use the lines.
+
+    Attributes:
+        group: The group of the system whose users may use them through the service; None: its own user alone.
+        audit: The file that each write over the network is appended to; None: none.
+        realtime: Whether the threads of the lines go before all others of the computer.
+        tcp: Where clients over the network find them.
+    """
+
+    group: str | None = None
+    audit: Path | None = None
+    realtime: bool = False
+    tcp: tuple[SiteTcp, ...] = ()
+
+
+def share_of(
+    file: Reading,
+    lines: Mapping[str, SiteLine],
+    drives: Mapping[str, SiteDrive],
+    groups: Mapping[str, tuple[SiteDrive, ...]],
+) -> SiteShare:
+    """What *file* says of sharing; what is wrong in it is complained of."""
+    table = file.data.get("share", {})
+    if not isinstance(table, dict):
+        file.complain(("share",), "share is a table: [share]")
+        return SiteShare()
+    file.check_keys(table, ("group", "audit", "realtime", "tcp"), ("share",))
+    group = file.value(("share",), table, "group", text)
+    audit = file.value(("share",), table, "audit", text)
+    realtime = file.value(("share",), table, "realtime", flag) or False
+    reader = _Tcp(file, lines, drives, groups)
+    tcp = [each for each in _tables(file, table, ("share", "tcp"), reader.read) if each is not None]
+    return SiteShare(group, None if audit is None else file.path.parent / audit, realtime, tuple(tcp))
+
+
+def _tables(file: Reading, table: Mapping[str, Any], where: Key, read: Any) -> list[Any]:
+    """Each table of the list at *where*, as *read* makes it."""
+    name = where[-1]
+    found = table.get(str(name), [])
+    if not isinstance(found, list) or not all(isinstance(each, dict) for each in found):
+        dotted = ".".join(str(each) for each in where if isinstance(each, str))
+        file.complain(where, f"{name} is a list of tables: [[{dotted}]]")
+        return []
+    return [read(each, (*where, place)) for place, each in enumerate(found)]
+
+
+@dataclass(frozen=True)
+class _Tcp:
+    """Reads the tables of addresses."""
+
+    file: Reading
+    lines: Mapping[str, SiteLine]
+    drives: Mapping[str, SiteDrive]
+    groups: Mapping[str, tuple[SiteDrive, ...]]
+
+    def read(self, table: dict[str, Any], where: Key) -> SiteTcp | None:
+        file = self.file
+        file.check_keys(table, ("line", "address", "answer_within", "dead_man", "allow"), where)
+        name = file.value(where, table, "line", text, needed=len(self.lines) != 1)
+        address = file.value(where, table, "address", _address, needed=True)
+        within = file.value(where, table, "answer_within", number(*_WITHIN))
+        dead_man = file.value(where, table, "dead_man", _dead_man)
+        line = self.lines.get(name) if name else next(iter(self.lines.values()), None)
+        if name is not None and line is None:
+            hint = checks.closest(name, self.lines)
+            file.complain((*where, "line"), f'there is no line "{name}"{hint}; there are {quoted(self.lines)}')
+        allow = _tables(file, table, (*where, "allow"), lambda each, there: self._allow(each, there, line))
+        if line is None or address is None:
+            return None
+        return SiteTcp(line, address, within or 1.0, dead_man, tuple(allow), file.line_of(where))
+
+    def _allow(self, table: dict[str, Any], where: Key, line: SiteLine | None) -> SiteAllow:
+        file = self.file
+        keys = ("networks", "drives", "units", "functions", "write", "commands")
+        file.check_keys(table, keys, where)
+        networks = file.value(where, table, "networks", listed(_network, '["192.168.7.0/24"]'))
+        names = file.value(where, table, "drives", listed(text, '["pump1"]')) or []
+        units = file.value(where, table, "units", listed(whole(0, 255), "[7]"))
+        functions = file.value(where, table, "functions", listed(_function, "[3, 6]"))
+        write = file.value(where, table, "write", listed(_register, '["P00.11"]'))
+        commands = file.value(where, table, "commands", listed(text, '["run", "setpoint"]'))
+        drives: dict[str, SiteDrive] = {}
+        for name in names:
+            members = self.groups.get(name, (self.drives[name],) if name in self.drives else ())
+            if not members and name not in self.groups:
+                hint = checks.closest(name, [*self.drives, *self.groups])
+                file.complain((*where, "drives"), f'there is no drive or group "{name}"{hint}')
+            for drive in members:
+                if line is not None and drive.line != line:
+                    file.complain((*where, "drives"), f'"{drive.name}" is on the line "{drive.line.name}"')
+                drives.setdefault(drive.name, drive)
+        at = {key: file.line_of((*where, key)) for key in keys if key in table} | {"": file.line_of(where)}
+        some = None if functions is None else tuple(functions)
+        return SiteAllow(
+            tuple(networks or ()),
+            tuple(drives.values()),
+            tuple(units or ()),
+            some,
+            tuple(write or ()),
+            tuple(commands or ()),
+            at,
+        )
+
+
+def _address(value: Any) -> str:
+    if not isinstance(value, str) or not re.fullmatch(r".+:\d{1,5}", value) or int(value.rpartition(":")[2]) > 0xFFFF:
+        raise Wrong('not an address and a port, such as "127.0.0.1:1502"')
+    return value
+
+
+def _dead_man(value: Any) -> float | Literal["off"]:
+    if value == "off":
+        return "off"
+    try:
+        return number(*_DEAD_MAN)(value)
+    except Wrong:
+        raise Wrong(f'neither "off" nor seconds from {_DEAD_MAN[0]:g} to {_DEAD_MAN[1]:g}') from None
+
+
+def _network(value: Any) -> str:
+    # Not for who has no such table: a stop waits for all that is loaded.
+    import ipaddress
+
+    try:
+        return str(ipaddress.ip_network(text(value)))
+    except ValueError as error:
+        raise Wrong(f"no address and no network: {error}") from None
+
+
+def _function(value: Any) -> int:
+    if isinstance(value, bool) or value not in (1, 2, 3, 4, 5, 6, 15, 16):
+        raise Wrong("functions that can be allowed are 1 to 6, 15 and 16")
+    return int(value)
+
+
+def _register(value: Any) -> str | int:
+    if isinstance(value, str):
+        return text(value)
+    return whole(0, 0xFFFF)(value)

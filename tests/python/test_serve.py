@@ -1,0 +1,268 @@
+"""`drivebus serve`: the file it takes, and a service over a real pseudo-terminal, ended in every way."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from drivebus import Simulator
+
+from .conftest import NO_PTY
+from .tcp_client import answer, request, seen
+
+RUN, STOP, LOOK = b"\x06\x20\x00\x00\x01", b"\x06\x20\x00\x00\x05", b"\x03\x21\x03\x00\x01"
+
+PLANT = """\
+[lines.hall]
+port = "{port}"
+baud = 115200
+
+[drives.pump1]
+line = "hall"
+unit = 1
+profile = "gd350"
+
+[drives.pump2]
+line = "hall"
+unit = 2
+
+[drives.heater]
+line = "hall"
+unit = 3
+profile = "gd3000-rectifier"
+
+[groups]
+pumps = ["pump1", "pump2"]
+
+[share]
+audit = "audit.jsonl"
+
+[[share.tcp]]
+address = "127.0.0.1:{tcp}"
+dead_man = 60
+answer_within = 20
+
+[[share.tcp.allow]]
+networks = ["127.0.0.0/8"]
+drives = ["pump1"]
+commands = ["run", "setpoint"]
+
+[[share.tcp.allow]]
+"""
+
+
+def serve(file: Path, *words: str, **options: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "drivebus", "--config", str(file), "serve", *words]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **options)  # type: ignore[call-overload,no-any-return]
+
+
+def file_of(folder: Path, port: object = "sim://gd350", tcp: int = 1502) -> Path:
+    file = folder / "drivebus.toml"
+    file.write_text(PLANT.format(port=port, tcp=tcp))
+    return file
+
+
+def test_a_file_without_mistakes(tmp_path: Path) -> None:
+    done = serve(file_of(tmp_path), "--check")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "1 line, 1 at Modbus TCP: no mistake" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "said"),
+    [
+        ('commands = ["run", "setpoint"]', 'commands = ["rum"]', 33, 'did you mean "run"'),
+        ('commands = ["run", "setpoint"]', 'write = ["P00.99"]', 33, "P00.99"),
+        ('commands = ["run", "setpoint"]', 'write = ["control_command"]', 33, "takes commands"),
+        ('commands = ["run", "setpoint"]', "functions = [6]", 33, "need what may be written"),
+        ('commands = ["run", "setpoint"]', "functions = [23]", 33, "1 to 6, 15 and 16"),
+        ('commands = ["run", "setpoint"]', 'command = ["run"]', 33, 'did you mean "commands"'),
+        ("dead_man = 60\n", "", 25, '"pump1", and nothing says what becomes of it'),
+        ("dead_man = 60", "dead_man = true", 27, 'neither "off" nor seconds'),
+        ("answer_within = 20", "answer_within = 99", 28, "not a number from 0.05 to 60"),
+        ('address = "127.0.0.1:1502"', 'address = "127.0.0.1"', 26, "not an address and a port"),
+        ('address = "127.0.0.1:1502"', "", 25, "has no address"),
+        ('["127.0.0.0/8"]', '["127.0.0.1/8"]', 31, "host bits set"),
+        ('drives = ["pump1"]', 'drives = ["pump3"]', 32, 'there is no drive or group "pump3"'),
+        ('drives = ["pump1"]', 'drives = ["pumps"]', 32, '"pump2" has no profile'),
+        ('drives = ["pump1"]', 'drives = ["heater"]', 33, "no command or setpoint of"),
+        ('drives = ["pump1"]', "units = [7]", 32, "knows no commands"),
+        ('drives = ["pump1"]\n', "", 30, "drives that are named"),
+        ("[[share.tcp.allow]]\n", "[share.tcp.allow]\n", 35, "not TOML"),
+        ('audit = "audit.jsonl"', "audit = 3", 23, "not a text"),
+        ('audit = "audit.jsonl"', 'audits = "a"', 23, 'did you mean "audit"'),
+        ('address = "127', 'line = "yard"\naddress = "127', 26, 'there is no line "yard"'),
+    ],
+)
+def test_a_mistake_is_named_with_its_line_and_nothing_starts(
+    tmp_path: Path, old: str, new: str, line: int, said: str
+) -> None:
+    file = file_of(tmp_path)
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    for words in (["--check"], []):
+        done = serve(file, *words)
+        assert done.returncode == 2
+        assert any(f"{file}:{line}: " in told and said in told for told in done.stderr.splitlines()), done.stderr
+    assert not (tmp_path / "audit.jsonl").exists()
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
+@contextmanager
+def plant(folder: Path) -> Iterator[tuple[Simulator, Path, int, dict[str, str]]]:
+    """A GD350 over a pseudo-terminal, ready to run at 50 Hz, and a file that serves it."""
+    (folder / "run").mkdir(mode=0o700)
+    environment = {**os.environ, "DRIVEBUS_RUNTIME_DIR": str(folder / "run")}
+    tcp = free_port()
+    with Simulator({1: "gd350"}, transport="pty", baudrate=115200) as simulator:
+        file = file_of(folder, simulator.port, tcp)
+        for words in (["prepare", "-y"], ["write", "set_frequency=50"]):
+            done = command(file, environment, *words)
+            assert done.returncode == 0, done.stderr
+        simulator.drive(1).take_writes()
+        yield simulator, file, tcp, environment
+
+
+def command(file: Path, environment: dict[str, str], *words: str) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, "-m", "drivebus", "--config", str(file), "-d", "pump1", *words]
+    return subprocess.run(line, capture_output=True, text=True, check=False, env=environment)
+
+
+@contextmanager
+def service(file: Path, environment: dict[str, str], *words: str) -> Iterator[subprocess.Popen[str]]:
+    line = [sys.executable, "-m", "drivebus", "--config", str(file), "serve", *words]
+    with subprocess.Popen(line, stderr=subprocess.PIPE, text=True, env=environment) as program:
+        try:
+            assert program.stderr is not None
+            told = program.stderr.readline()
+            assert "is served at 127.0.0.1:" in told, told + program.stderr.read()
+            yield program
+        finally:
+            program.kill()
+
+
+def ask(client: socket.socket, pdu: bytes) -> bytes:
+    client.sendall(request(1, 1, pdu))
+    return answer(client)[2]
+
+
+@NO_PTY
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_its_end_halts_what_clients_set_in_motion(tmp_path: Path, number: int) -> None:
+    with plant(tmp_path) as (simulator, file, tcp, environment):
+        with (
+            service(file, environment) as program,
+            socket.create_connection(("127.0.0.1", tcp), timeout=20) as client,
+        ):
+            assert ask(client, RUN) == RUN
+            program.send_signal(number)
+            assert program.wait() == 0
+        seen(lambda: simulator.drive(1).state == "stopped")
+        assert [write[1:] for write in simulator.drive(1).take_writes()] == [(0x2000, 1), (0x2000, 5)]
+        assert not list((tmp_path / "run").glob("serve-*"))
+        told = [json.loads(line) for line in (tmp_path / "audit.jsonl").read_text().splitlines()]
+        assert [line.get("outcome") for line in told] == ["done", None]
+
+
+@NO_PTY
+def test_killed_and_started_again(tmp_path: Path) -> None:
+    """The next one halts the motor, and what was written stands in the audit."""
+    with plant(tmp_path) as (simulator, file, tcp, environment):
+        with (
+            service(file, environment) as program,
+            socket.create_connection(("127.0.0.1", tcp), timeout=20) as client,
+        ):
+            assert ask(client, RUN) == RUN
+            program.kill()
+            program.wait()
+        assert [json.loads(line)["outcome"] for line in (tmp_path / "audit.jsonl").read_text().splitlines()] == ["done"]
+        assert simulator.drive(1).state == "forward"
+        with service(file, environment):
+            seen(lambda: simulator.drive(1).state == "stopped")
+
+
+@NO_PTY
+def test_other_programs_use_the_line_through_it(tmp_path: Path) -> None:
+    with (
+        plant(tmp_path) as (simulator, file, tcp, environment),
+        service(file, environment),
+        socket.create_connection(("127.0.0.1", tcp), timeout=20) as client,
+    ):
+        assert ask(client, RUN) == RUN
+        assert command(file, environment, "stop").returncode == 0
+        seen(lambda: simulator.drive(1).state == "stopped")
+        assert ask(client, LOOK) == b"\x03\x02\x01\xa0"
+
+
+@NO_PTY
+def test_its_status(tmp_path: Path) -> None:
+    with plant(tmp_path) as (_, file, tcp, environment):
+        nobody = serve(file, "--status", env=environment)
+        assert nobody.returncode == 2
+        assert "no service of" in nobody.stderr
+        with service(file, environment), socket.create_connection(("127.0.0.1", tcp), timeout=20) as client:
+            assert ask(client, LOOK) == b"\x03\x02\x01\xa0"
+
+            def status() -> dict[str, object]:
+                done = subprocess.run(
+                    [sys.executable, "-m", "drivebus", "--json", "--config", str(file), "serve", "--status"],
+                    capture_output=True,
+                    text=True,
+                    check=True,
+                    env=environment,
+                )
+                return json.loads(done.stdout)["lines"]["hall"]["tcp"][f"127.0.0.1:{tcp}"]  # type: ignore[no-any-return]
+
+            seen(lambda: status()["requests"] == 1)
+            assert status()["clients"] == 1
+            assert "1 client, 1 request: 1 answered" in serve(file, "--status", env=environment).stdout
+
+
+@NO_PTY
+def test_a_line_that_is_away_is_waited_for_and_the_others_are_served(tmp_path: Path) -> None:
+    with plant(tmp_path) as (simulator, file, tcp, environment):
+        away = tmp_path / "port"
+        text = file.read_text().replace(simulator.port, str(away))
+        file.write_text(text)
+        line = [sys.executable, "-m", "drivebus", "--config", str(file), "serve"]
+        with subprocess.Popen(line, stderr=subprocess.PIPE, text=True, env=environment) as program:
+            assert program.stderr is not None
+            assert "tried again each second" in program.stderr.readline()
+            away.symlink_to(simulator.port)
+            assert "is served at" in program.stderr.readline()
+            with socket.create_connection(("127.0.0.1", tcp), timeout=20) as client:
+                assert ask(client, LOOK) == b"\x03\x02\x01\xa0"
+            program.terminate()
+
+
+@NO_PTY
+def test_what_systemd_is_told(tmp_path: Path) -> None:
+    """Ready when it serves, signs of life while the line goes on, and its end."""
+    with plant(tmp_path) as (_, file, _, environment), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        manager.settimeout(60)
+        environment |= {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "400000"}
+        environment.pop("WATCHDOG_PID", None)
+        with service(file, environment) as program:
+            assert manager.recv(100) == b"READY=1"
+            assert [manager.recv(100) for _ in range(3)] == [b"WATCHDOG=1"] * 3
+            program.terminate()
+            program.wait()
+        told = b"WATCHDOG=1"
+        while told == b"WATCHDOG=1":
+            told = manager.recv(100)
+        assert told == b"STOPPING=1"
