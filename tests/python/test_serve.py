@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -266,3 +267,26 @@ def test_what_systemd_is_told(tmp_path: Path) -> None:
         while told == b"WATCHDOG=1":
             told = manager.recv(100)
         assert told == b"STOPPING=1"
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd")
+def test_the_unit_of_the_manual(tmp_path: Path) -> None:
+    """As it is printed, with a program that is here: systemd finds nothing wrong with it."""
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "service.md").read_text()
+    unit = page.partition("```ini\n")[2].partition("```")[0]
+    assert "/opt/drivebus/bin/drivebus" in unit
+    place = tmp_path / "drivebus.service"
+    place.write_text(unit.replace("/opt/drivebus/bin/drivebus", "/bin/true"))
+    done = subprocess.run(
+        ["systemd-analyze", "verify", "--man=no", str(place)], capture_output=True, text=True, check=False
+    )
+    assert [line for line in done.stderr.splitlines() if "drivebus.service" in line] == []
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_file_of_the_manual(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "service.md").read_text()
+    file = tmp_path / "drivebus.toml"
+    file.write_text(page.partition("```toml\n")[2].partition("```")[0])
+    done = serve(file, "--check")
+    assert (done.returncode, done.stderr) == (0, "")
