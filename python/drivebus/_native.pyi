@@ -231,6 +231,7 @@ class Bus:
         low_latency: bool = True,
         queue: int = 65_536,
         share: str = "auto",
+        realtime: bool = False,
     ) -> Bus:
         """Opens *port*.
 
@@ -471,6 +472,7 @@ def open_bus(
     low_latency: bool = True,
     queue: int = 65_536,
     share: str = "auto",
+    realtime: bool = False,
 ) -> Asked[Bus]:
     """Opens a `Bus` in a thread of its own, and leaves it in *mailbox*."""
 

@@ -69,6 +69,9 @@ class Bus(BusFace, Requests):
         share: Whether other programs of the same user may use the port at the same time. `"auto"`: the first program to
             open the port owns it and serves later ones, which go through it. `"own"`: as the owner it serves nobody.
             `"never"`: it serves nobody, and a port that another program has is busy. For serial ports and `socket://`.
+        realtime: Whether the threads of the bus's own go before all programs of the computer that did not ask for that:
+            polls, event loops, clients over the network (`SCHED_FIFO`). What is asked from a thread of yours goes at
+            its own priority. Where the system refuses it, `stats().notes` says so and what to do. Linux alone has it.
         reserved: Whether addresses that the specification reserves may be asked: units 248 to 254 on a serial line, and
             writes to unit 0 over `tcp://`, which a gateway hands on to every unit behind it. Without it, 0 can be read
             and 248 to 255 asked over `tcp://`.

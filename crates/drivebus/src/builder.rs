@@ -187,6 +187,14 @@ impl Builder {
         self
     }
 
+    /// Whether the threads of the bus's own go before all programs of the computer that did not ask for that, by
+    /// `SCHED_FIFO`. Where the system refuses it, [`Bus::notes`] says so. Linux alone has it.
+    #[must_use]
+    pub fn realtime(mut self, realtime: bool) -> Self {
+        self.options.realtime = realtime;
+        self
+    }
+
     /// Opens `port`: a path, or one of the URLs in the [crate's documentation](crate#ports).
     ///
     /// # Errors

@@ -34,6 +34,10 @@ pub struct BusOptions {
     pub queue: usize,
     /// Whether the port is shared with other programs of the same user.
     pub share: Share,
+    /// Whether the threads of the bus's own go before all others of the computer that are not of that kind (`SCHED_FIFO`):
+    /// workers, polls, and those of clients over the network. Where the system refuses that,
+    /// [`Bus::notes`](crate::Bus::notes) says so.
+    pub realtime: bool,
 }
 
 impl BusOptions {
@@ -50,6 +54,7 @@ impl BusOptions {
             learn_timeout: false,
             queue: DEFAULT_QUEUE,
             share: Share::Auto,
+            realtime: false,
         }
     }
 
@@ -114,6 +119,12 @@ impl BusOptions {
     #[must_use]
     pub const fn share(self, share: Share) -> Self {
         Self { share, ..self }
+    }
+
+    /// Sets [`realtime`](Self#structfield.realtime).
+    #[must_use]
+    pub const fn realtime(self, realtime: bool) -> Self {
+        Self { realtime, ..self }
     }
 }
 

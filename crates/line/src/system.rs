@@ -9,6 +9,8 @@ pub(crate) mod inherited;
 mod listed;
 pub(crate) mod process;
 pub(crate) mod punctual;
+#[cfg(target_os = "linux")]
+mod realtime;
 #[cfg(all(unix, feature = "share"))]
 pub(crate) mod sockets;
 pub(crate) mod sync;

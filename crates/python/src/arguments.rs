@@ -13,7 +13,7 @@ use crate::format::SerialFormat;
 use crate::open;
 
 /// What opens the port, and how the bus behaves then.
-#[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
+#[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "the keywords of the Python class")]
 pub(crate) fn to_open(
     port: &Bound<'_, PyAny>,
     format: SerialFormat,
@@ -27,6 +27,7 @@ pub(crate) fn to_open(
     low_latency: bool,
     queue: usize,
     share: &str,
+    realtime: bool,
 ) -> PyResult<(Opener, Option<PortKey>, BusOptions)> {
     let echo: AdapterEcho = echo.parse().map_err(refuse)?;
     let share: Share = share.parse().map_err(refuse)?;
@@ -34,7 +35,11 @@ pub(crate) fn to_open(
     let timeout = duration("timeout", timeout)?;
     let turnaround = duration("turnaround", turnaround)?;
     let options = BusOptions::new(format).timeout(timeout).retries(retries).read_only(read_only).echo(echo);
-    Ok((opener, key, options.turnaround(turnaround).learn_timeout(learn_timeout).queue(queue).share(share)))
+    Ok((
+        opener,
+        key,
+        options.turnaround(turnaround).learn_timeout(learn_timeout).queue(queue).share(share).realtime(realtime),
+    ))
 }
 
 /// Why a bus could not be opened.

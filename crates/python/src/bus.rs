@@ -39,8 +39,12 @@ pub(crate) struct Bus {
 impl Bus {
     #[new]
     #[pyo3(signature = (port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
-        turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536, share = "auto"))]
-    #[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
+        turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536, share = "auto", realtime = false))]
+    #[expect(
+        clippy::too_many_arguments,
+        clippy::fn_params_excessive_bools,
+        reason = "the keywords of the Python class"
+    )]
     fn new(
         py: Python<'_>,
         port: &Bound<'_, PyAny>,
@@ -55,6 +59,7 @@ impl Bus {
         low_latency: bool,
         queue: usize,
         share: &str,
+        realtime: bool,
     ) -> PyResult<Self> {
         let (opener, key, options) = to_open(
             port,
@@ -69,6 +74,7 @@ impl Bus {
             low_latency,
             queue,
             share,
+            realtime,
         )?;
         let core =
             with_signals(py, |give_up| CoreBus::open_shared(opener, key, options, give_up))?.map_err(open_failed)?;

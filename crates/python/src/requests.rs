@@ -70,8 +70,8 @@ impl Asked {
 /// Opens a bus in a thread of its own; it comes as a letter.
 #[pyfunction]
 #[pyo3(signature = (mailbox, port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
-    turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536, share = "auto"))]
-#[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
+    turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536, share = "auto", realtime = false))]
+#[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "the keywords of the Python class")]
 pub(crate) fn open_bus(
     mailbox: &Mailbox,
     port: &Bound<'_, PyAny>,
@@ -86,6 +86,7 @@ pub(crate) fn open_bus(
     low_latency: bool,
     queue: usize,
     share: &str,
+    realtime: bool,
 ) -> PyResult<Asked> {
     let (opener, key, options) = to_open(
         port,
@@ -100,6 +101,7 @@ pub(crate) fn open_bus(
         low_latency,
         queue,
         share,
+        realtime,
     )?;
     apart(&mailbox.inbox, move |wanted| {
         let core = CoreBus::open_shared(opener, key, options, &mut || !wanted.load(Ordering::Acquire));

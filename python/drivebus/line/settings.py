@@ -53,6 +53,7 @@ class Opening:
         low_latency: bool,
         queue: int,
         share: str,
+        realtime: bool,
         reserved: bool,
         trace: object,
     ) -> None:
@@ -72,6 +73,7 @@ class Opening:
             "low_latency": checks.flag("low_latency", low_latency),
             "queue": checks.whole("queue", queue, 1, 1_000_000),
             "share": checks.one_of("share", share, ("auto", "own", "never")),
+            "realtime": checks.flag("realtime", realtime),
         }
         _check_together(port, self.keywords)
         target = port_urls.resolve(port, line)
@@ -129,6 +131,7 @@ class BusOptions(TypedDict, total=False):
     low_latency: bool
     queue: int
     share: str
+    realtime: bool
     reserved: bool
     trace: str | os.PathLike[str] | None
 
@@ -182,6 +185,7 @@ class BusFace:
         low_latency: bool = True,
         queue: int = 65_536,
         share: str = "auto",
+        realtime: bool = False,
         reserved: bool = False,
         trace: str | os.PathLike[str] | None = None,
     ) -> None:
@@ -198,6 +202,7 @@ class BusFace:
             low_latency=low_latency,
             queue=queue,
             share=share,
+            realtime=realtime,
             reserved=reserved,
             trace=trace,
         )

@@ -134,7 +134,7 @@ class _Served:
 
     def _begin(self, stack: ExitStack) -> None:
         line = self._line
-        options: dict[str, Any] = {"reserved": line.reserved}
+        options: dict[str, Any] = {"reserved": line.reserved, "realtime": self._site.share.realtime}
         if line.baud is not None:
             options["baudrate"] = line.baud
         if line.format is not None:

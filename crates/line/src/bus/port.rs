@@ -290,7 +290,7 @@ impl Port {
     /// A thread that works for this line alone comes: it goes before others where it may.
     pub(crate) fn enter_thread(&self) {
         if !self.is_virtual()
-            && let Err(refused) = punctual::go_first()
+            && let Err(refused) = punctual::go_first(self.options.realtime)
         {
             self.priority_refused.get_or_init(|| refused);
         }

@@ -34,6 +34,13 @@ impl Common {
         self.bus.upgrade().filter(|bus| !bus.is_closed())
     }
 
+    /// This thread works for the bus alone.
+    pub(super) fn enter_thread(&self) {
+        if let Some(bus) = self.bus.upgrade() {
+            bus.enter_thread();
+        }
+    }
+
     /// `client` is gone, or silent: what it commanded is halted. `why` is for people.
     pub(super) fn gone(self: &Arc<Self>, client: u64, name: &str, why: &str) {
         for unit in self.commanders.gone(client, &self.wills_of(name)) {

@@ -37,13 +37,16 @@ pub(super) fn serve(connection: Connection) -> std::io::Result<()> {
     let mailbox = Arc::new(Mailbox::default());
     let reader = Arc::clone(&stream);
     let letters = Arc::clone(&mailbox);
+    let common = Arc::clone(&connection.common);
     std::thread::Builder::new().name("drivebus-tcp-in".to_owned()).spawn(move || {
+        common.enter_thread();
         let why = read(&reader, &letters);
         letters.end(why);
     })?;
     let (letters, end) = (Arc::clone(&mailbox), Arc::clone(&stream));
     let desk = std::thread::Builder::new().name("drivebus-tcp".to_owned());
     let spawned = desk.spawn(move || {
+        connection.common.enter_thread();
         let desk = Desk::new(connection.common.within, IN_FLIGHT);
         let why = Clerk::new(connection, desk).work(&stream, &letters);
         letters.end(why);

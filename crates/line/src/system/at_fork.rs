@@ -1,7 +1,7 @@
 //! What a forked child does before anything else: it gives up what its parent has open (`listed`), and has its own timer slack
 //! again (`punctual`).
 //!
-//! One of the three files of this project with `unsafe`: no crate offers `pthread_atfork` in safe Rust, since what runs there is
+//! One of the four files of this project with `unsafe`: no crate offers `pthread_atfork` in safe Rust, since what runs there is
 //! bound as a signal handler is. It takes no lock, allocates nothing, and calls `dup3` and `prctl` alone (elsewhere than on Linux
 //! `dup2` and `fcntl`).
 //!

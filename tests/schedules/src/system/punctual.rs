@@ -4,7 +4,7 @@ pub(crate) fn note() -> Option<String> {
     None
 }
 
-pub(crate) fn go_first() -> Result<(), String> {
+pub(crate) fn go_first(_realtime: bool) -> Result<(), String> {
     Ok(())
 }
 

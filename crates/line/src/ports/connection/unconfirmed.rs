@@ -4,7 +4,7 @@
 //! Without it the system keeps on trying for a quarter of an hour, and a server that is reached again then gets every request of
 //! that time at once, commands that nobody wants any more among them.
 //!
-//! One of the three files of this project with `unsafe`: no crate has the options of Apple and Windows in safe Rust.
+//! One of the four files of this project with `unsafe`: no crate has the options of Apple and Windows in safe Rust.
 #![cfg_attr(
     any(target_vendor = "apple", windows),
     expect(unsafe_code, reason = "no crate has these two options in safe Rust")

@@ -1,6 +1,6 @@
 //! The low-latency flag of a port's driver: two ioctls that no crate offers in safe Rust.
 //!
-//! One of the three files of this project with `unsafe`. `serial2`, `rustix` and `nix` leave `TIOCGSERIAL` and `TIOCSSERIAL` out;
+//! One of the four files of this project with `unsafe`. `serial2`, `rustix` and `nix` leave `TIOCGSERIAL` and `TIOCSSERIAL` out;
 //! `serialport_low_latency` has them for ports of `serialport` only, and brings bindgen. Without the flag only root, or a
 //! udev rule, takes the 16 ms off every answer that an FTDI adapter adds from the factory.
 
