@@ -93,6 +93,13 @@ SECTIONS = [
         module("gateway"),
     ),
     Section(
+        "busy",
+        "A busy machine",
+        "Two processes for each core that never wait, and reads of one word at 115200 bit/s: a poll of drivebus as "
+        "usual and with `realtime=True`, and the C master at its usual priority and in real time, in turns.",
+        module("busy"),
+    ),
+    Section(
         "aio_loop",
         "Many lines in one event loop",
         "The same lines, read by tasks of one asyncio loop. A tick is how much later than asked a task wakes up that "

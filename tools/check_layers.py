@@ -63,8 +63,8 @@ FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
     "drivebus": re.compile(r"\bunsafe\b"),
 }
 
-# The files with `unsafe`, which say why: two ioctls, what a forked child runs, a policy of the scheduler, and two socket
-# options, that no crate offers in safe Rust.
+# The files with `unsafe`, which say why: two ioctls, what a forked child runs, a policy of the scheduler, and two
+# socket options, that no crate offers in safe Rust.
 UNSAFE_ALLOWED = {
     "crates/line/src/ports/tty/low_latency.rs",
     "crates/line/src/system/at_fork.rs",
