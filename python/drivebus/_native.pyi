@@ -231,6 +231,7 @@ class Bus:
         low_latency: bool = True,
         queue: int = 65_536,
         share: str = "auto",
+        group: int | None = None,
         realtime: bool = False,
     ) -> Bus:
         """Opens *port*.
@@ -472,6 +473,7 @@ def open_bus(
     low_latency: bool = True,
     queue: int = 65_536,
     share: str = "auto",
+    group: int | None = None,
     realtime: bool = False,
 ) -> Asked[Bus]:
     """Opens a `Bus` in a thread of its own, and leaves it in *mailbox*."""

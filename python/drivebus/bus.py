@@ -69,6 +69,9 @@ class Bus(BusFace, Requests):
         share: Whether other programs of the same user may use the port at the same time. `"auto"`: the first program to
             open the port owns it and serves later ones, which go through it. `"own"`: as the owner it serves nobody.
             `"never"`: it serves nobody, and a port that another program has is busy. For serial ports and `socket://`.
+        group: A group of the system, by name or number, whose users may use the port through this program, beside its
+            own user's: for a service. They meet in `/run/drivebus`, which this user has, or may make. They may do all
+            that this program may. Unix only.
         realtime: Whether the threads of the bus's own go before all programs of the computer that did not ask for that:
             polls, event loops, clients over the network (`SCHED_FIFO`). What is asked from a thread of yours goes at
             its own priority. Where the system refuses it, `stats().notes` says so and what to do. Linux alone has it.

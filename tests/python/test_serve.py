@@ -188,6 +188,7 @@ def test_killed_and_started_again(tmp_path: Path) -> None:
             socket.create_connection(("127.0.0.1", tcp), timeout=20) as client,
         ):
             assert ask(client, RUN) == RUN
+            seen(lambda: bool((tmp_path / "audit.jsonl").stat().st_size))
             program.kill()
             program.wait()
         assert [json.loads(line)["outcome"] for line in (tmp_path / "audit.jsonl").read_text().splitlines()] == ["done"]

@@ -187,6 +187,14 @@ impl Builder {
         self
     }
 
+    /// The number of a group of the system whose users may use the port through this program, beside its own user's: for a
+    /// service. They meet in `/run/drivebus`, which this user has, or may make. Only on systems with Unix sockets.
+    #[must_use]
+    pub fn group(mut self, group: u32) -> Self {
+        self.options.group = Some(group);
+        self
+    }
+
     /// Whether the threads of the bus's own go before all programs of the computer that did not ask for that, by
     /// `SCHED_FIFO`. Where the system refuses it, [`Bus::notes`] says so. Linux alone has it.
     #[must_use]

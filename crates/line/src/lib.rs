@@ -117,7 +117,7 @@ pub use ports::{mbap, tcp};
 #[cfg(feature = "serial")]
 pub use ports::{rs485, tty};
 #[cfg(all(unix, feature = "share"))]
-pub use share::place::run_time_folder;
+pub use share::folder::run_time_folder;
 pub use system::clock;
 pub use trace::{Direction, Overheard, Traced, Watch};
 pub use turns::order::Priority;

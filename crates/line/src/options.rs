@@ -34,6 +34,9 @@ pub struct BusOptions {
     pub queue: usize,
     /// Whether the port is shared with other programs of the same user.
     pub share: Share,
+    /// The number of a group of the system whose users may use the port through this program, beside its own user: they meet in
+    /// `/run/drivebus`. Only where there are Unix sockets; `None`: its own user's programs alone.
+    pub group: Option<u32>,
     /// Whether the threads of the bus's own go before all others of the computer that are not of that kind (`SCHED_FIFO`):
     /// workers, polls, and those of clients over the network. Where the system refuses that,
     /// [`Bus::notes`](crate::Bus::notes) says so.
@@ -54,6 +57,7 @@ impl BusOptions {
             learn_timeout: false,
             queue: DEFAULT_QUEUE,
             share: Share::Auto,
+            group: None,
             realtime: false,
         }
     }
@@ -119,6 +123,12 @@ impl BusOptions {
     #[must_use]
     pub const fn share(self, share: Share) -> Self {
         Self { share, ..self }
+    }
+
+    /// Sets [`group`](Self#structfield.group).
+    #[must_use]
+    pub const fn group(self, group: Option<u32>) -> Self {
+        Self { group, ..self }
     }
 
     /// Sets [`realtime`](Self#structfield.realtime).

@@ -1,9 +1,10 @@
-//! One port, several programs of one user: what they say to each other over a local socket, and where they meet.
+//! One port, several programs of one user or of a group: what they say to each other over a local socket, and where they meet.
 //!
 //! | room | what is in it |
 //! | --- | --- |
 //! | `key` | which port it is, whatever people call it |
-//! | `place` | the socket of a port in the run-time directory, and who may use it |
+//! | `folder` | the folders in which programs meet |
+//! | `place` | the socket of a port in one of them, and who may use it |
 //! | `message`, `failure` | what is said |
 //! | `channel` | one connection: messages in and out, with limits |
 //! | `guest` | the side of a program that uses a port through another |
@@ -13,6 +14,7 @@
 
 pub(crate) mod channel;
 pub(crate) mod failure;
+pub(crate) mod folder;
 pub(crate) mod guest;
 pub(crate) mod message;
 pub(crate) mod place;

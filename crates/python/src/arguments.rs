@@ -27,6 +27,7 @@ pub(crate) fn to_open(
     low_latency: bool,
     queue: usize,
     share: &str,
+    group: Option<u32>,
     realtime: bool,
 ) -> PyResult<(Opener, Option<PortKey>, BusOptions)> {
     let echo: AdapterEcho = echo.parse().map_err(refuse)?;
@@ -38,7 +39,13 @@ pub(crate) fn to_open(
     Ok((
         opener,
         key,
-        options.turnaround(turnaround).learn_timeout(learn_timeout).queue(queue).share(share).realtime(realtime),
+        options
+            .turnaround(turnaround)
+            .learn_timeout(learn_timeout)
+            .queue(queue)
+            .share(share)
+            .group(group)
+            .realtime(realtime),
     ))
 }
 

@@ -39,7 +39,7 @@ pub(crate) struct Bus {
 impl Bus {
     #[new]
     #[pyo3(signature = (port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
-        turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536, share = "auto", realtime = false))]
+        turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536, share = "auto", group = None, realtime = false))]
     #[expect(
         clippy::too_many_arguments,
         clippy::fn_params_excessive_bools,
@@ -59,6 +59,7 @@ impl Bus {
         low_latency: bool,
         queue: usize,
         share: &str,
+        group: Option<u32>,
         realtime: bool,
     ) -> PyResult<Self> {
         let (opener, key, options) = to_open(
@@ -74,6 +75,7 @@ impl Bus {
             low_latency,
             queue,
             share,
+            group,
             realtime,
         )?;
         let core =

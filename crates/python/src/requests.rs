@@ -70,7 +70,7 @@ impl Asked {
 /// Opens a bus in a thread of its own; it comes as a letter.
 #[pyfunction]
 #[pyo3(signature = (mailbox, port, format, *, timeout = 0.5, retries = 2, read_only = false, rs485 = None, echo = "auto",
-    turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536, share = "auto", realtime = false))]
+    turnaround = 0.1, learn_timeout = false, low_latency = true, queue = 65_536, share = "auto", group = None, realtime = false))]
 #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "the keywords of the Python class")]
 pub(crate) fn open_bus(
     mailbox: &Mailbox,
@@ -86,6 +86,7 @@ pub(crate) fn open_bus(
     low_latency: bool,
     queue: usize,
     share: &str,
+    group: Option<u32>,
     realtime: bool,
 ) -> PyResult<Asked> {
     let (opener, key, options) = to_open(
@@ -101,6 +102,7 @@ pub(crate) fn open_bus(
         low_latency,
         queue,
         share,
+        group,
         realtime,
     )?;
     apart(&mailbox.inbox, move |wanted| {

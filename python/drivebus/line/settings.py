@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, TypedDict
 
@@ -53,6 +54,7 @@ class Opening:
         low_latency: bool,
         queue: int,
         share: str,
+        group: str | int | None,
         realtime: bool,
         reserved: bool,
         trace: object,
@@ -73,6 +75,7 @@ class Opening:
             "low_latency": checks.flag("low_latency", low_latency),
             "queue": checks.whole("queue", queue, 1, 1_000_000),
             "share": checks.one_of("share", share, ("auto", "own", "never")),
+            "group": _group_number(group),
             "realtime": checks.flag("realtime", realtime),
         }
         _check_together(port, self.keywords)
@@ -98,6 +101,21 @@ def check_trust(profile: object, trust: object) -> None:
     """Refuses trust in a *profile* that was not named: what the drive says it is, it cannot contradict."""
     if checks.flag("trust_profile", trust) and profile is None:
         raise BadArgument(Text("trust_profile needs a profile: give ", argument("profile"), " too"))
+
+
+def _group_number(group: object) -> int | None:
+    """The number by which the system knows a group."""
+    if group is None:
+        return None
+    if sys.platform == "win32":
+        raise BadArgument("group: programs of several users share a port over Unix sockets, which this system has not")
+    import grp
+
+    try:
+        known = grp.getgrgid(group) if isinstance(group, int) else grp.getgrnam(str(group))
+    except (KeyError, OverflowError, ValueError):
+        raise BadArgument(f"group {checks.shown(group)} is none of this system; `getent group` lists them") from None
+    return known.gr_gid
 
 
 def _wire_file(path: object, port: str, line: SerialFormat) -> WireFile:
@@ -131,6 +149,7 @@ class BusOptions(TypedDict, total=False):
     low_latency: bool
     queue: int
     share: str
+    group: str | int | None
     realtime: bool
     reserved: bool
     trace: str | os.PathLike[str] | None
@@ -185,6 +204,7 @@ class BusFace:
         low_latency: bool = True,
         queue: int = 65_536,
         share: str = "auto",
+        group: str | int | None = None,
         realtime: bool = False,
         reserved: bool = False,
         trace: str | os.PathLike[str] | None = None,
@@ -202,6 +222,7 @@ class BusFace:
             low_latency=low_latency,
             queue=queue,
             share=share,
+            group=group,
             realtime=realtime,
             reserved=reserved,
             trace=trace,

@@ -134,7 +134,8 @@ class _Served:
 
     def _begin(self, stack: ExitStack) -> None:
         line = self._line
-        options: dict[str, Any] = {"reserved": line.reserved, "realtime": self._site.share.realtime}
+        share = self._site.share
+        options: dict[str, Any] = {"reserved": line.reserved, "realtime": share.realtime, "group": share.group}
         if line.baud is not None:
             options["baudrate"] = line.baud
         if line.format is not None:

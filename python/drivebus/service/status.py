@@ -16,7 +16,7 @@ from drivebus.site import Site
 
 __all__ = ["StatusFile", "read_status"]
 
-_MACHINE = Path("/run/drivebus")
+_MACHINE = Path(os.environ.get("DRIVEBUS_MACHINE_DIR") or "/run/drivebus")
 """The folder that a service of the machine gets from its service manager."""
 
 

@@ -62,6 +62,9 @@ mod share {
     pub(crate) mod channel {
         include!("share/channel.rs");
     }
+    pub(crate) mod folder {
+        include!("share/folder.rs");
+    }
     pub(crate) mod guest {
         include!("share/guest.rs");
     }

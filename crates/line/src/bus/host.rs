@@ -26,14 +26,15 @@ use crate::line::{PortError, PortErrorKind};
 use crate::options::UnitOptions;
 use crate::share::channel::Channel;
 use crate::share::failure::Said;
+use crate::share::folder::user_named;
 use crate::share::guest::readable;
 use crate::share::message::{
     Characters, Figures, GREETING, Hello, LET_IN, Order, SENT_AWAY, Told, VERSION, Welcome, Wish,
 };
-use crate::share::place::{Door, Place};
+use crate::share::place::{Door, Place, ReachedBy};
 use crate::system::clock::monotonic;
 use crate::system::inherited::Kept;
-use crate::system::process::{self, Life, Process};
+use crate::system::process::{self, Life, Peer, Process};
 use crate::system::sockets::{Shutdown, UnixStream};
 use crate::system::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use crate::system::sync::{Mutex, MutexGuard, PoisonError, thread};
@@ -108,11 +109,11 @@ impl Host {
                 &entrances,
                 &woken,
                 |refused| guests.keeps_out(refused),
-                |stream, is_private| {
+                |stream, reached_by| {
                     let (guests, port) = (Arc::clone(&guests), Weak::clone(&port));
                     // Where the system gives no thread, the guest finds its connection ended.
                     let guest = thread::Builder::new().name("drivebus-guest".to_owned());
-                    guest.spawn(move || serve(stream, is_private, &guests, &port)).map(drop)
+                    guest.spawn(move || serve(stream, reached_by, &guests, &port)).map(drop)
                 },
             );
         })?;
@@ -186,12 +187,16 @@ impl Guests {
     fn enter(
         self: &Arc<Self>,
         hello: &Hello,
-        process: u32,
+        peer: &Peer,
         stream: Arc<Kept<UnixStream>>,
         programs: &Arc<Programs>,
     ) -> Result<Visit, String> {
         let mut inside = self.lock();
-        let name = readable(&hello.program);
+        let (name, process) = (readable(&hello.program), peer.process);
+        let name = match peer.user.filter(|&user| user != process::user()) {
+            Some(user) => format!("{name} of {}", user_named(user)),
+            None => name,
+        };
         // A process that this one cannot see is told from others by its name alone.
         let is_it = |entry: &&Arc<Entry>| {
             entry.connections.load(Ordering::Relaxed) > 0
@@ -279,12 +284,18 @@ impl Drop for Visit {
 }
 
 /// Serves one connection to its end.
-fn serve(stream: UnixStream, is_private: bool, guests: &Arc<Guests>, port: &Weak<Port>) {
+fn serve(stream: UnixStream, reached_by: ReachedBy, guests: &Arc<Guests>, port: &Weak<Port>) {
     let peer = process::peer(&stream);
-    let is_this_user = peer.is_this_user.unwrap_or(is_private);
+    let is_of_another = peer.user.is_some_and(|user| user != process::user());
+    let may_come_in = match reached_by {
+        ReachedBy::ThisUser => !is_of_another,
+        // The system looked whether it may connect.
+        ReachedBy::Group => true,
+        ReachedBy::Anybody => peer.user.is_some() && !is_of_another,
+    };
     let Ok(mut channel) = Channel::new(stream, MOST, Arc::new(Life::Unknown)) else { return };
-    let let_in = if is_this_user {
-        let_in(&mut channel, peer.process, guests, port)
+    let let_in = if may_come_in {
+        let_in(&mut channel, &peer, guests, port)
     } else {
         Err("this port is open in a program of another user".to_owned())
     };
@@ -309,7 +320,7 @@ fn serve(stream: UnixStream, is_private: bool, guests: &Arc<Guests>, port: &Weak
 /// Hears who comes; `Err` says why it cannot come in, `None` that it said nothing.
 fn let_in(
     channel: &mut Channel,
-    process: u32,
+    peer: &Peer,
     guests: &Arc<Guests>,
     port: &Weak<Port>,
 ) -> Result<Option<Visit>, String> {
@@ -332,7 +343,7 @@ fn let_in(
             hello.characters
         ));
     }
-    let visit = guests.enter(&hello, process, channel.end(), &port.programs)?;
+    let visit = guests.enter(&hello, peer, channel.end(), &port.programs)?;
     channel.depends_on(Arc::clone(&visit.entry.life));
     let welcome =
         Welcome { program: process::own_name(), process: std::process::id(), reconnects: port.figures.reconnects() };

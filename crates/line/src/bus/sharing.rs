@@ -42,6 +42,7 @@ const LOOKS: Duration = Duration::from_secs(1);
 pub(super) struct Sharing {
     key: PortKey,
     share: Share,
+    group: Option<u32>,
     hello: Hello,
     /// The port, once it is made.
     port: OnceLock<Weak<Port>>,
@@ -64,6 +65,10 @@ fn end_vigil(connection: Option<Arc<Kept<UnixStream>>>) {
         // It may have ended already.
         let _ = connection.shutdown(Shutdown::Both);
     }
+}
+
+fn not_through_this(why: &std::io::Error) -> String {
+    format!("other programs cannot use this port through this one: {why}")
 }
 
 #[derive(Debug, Default)]
@@ -94,6 +99,7 @@ impl Sharing {
         Self {
             key,
             share: options.share,
+            group: options.group,
             hello: Hello { program: own_name(), characters: Characters::of(&options.format), is_for_a_stop: false },
             port: OnceLock::new(),
             stats: Arc::clone(stats),
@@ -131,7 +137,7 @@ impl Sharing {
     /// Who serves it is asked for before the port is opened: what keeps others out is not known everywhere. A container has a
     /// node of its own for a device, whose lock is another one; and a serial server may serve one client only, the last.
     fn open(self: &Arc<Self>, open: &mut Opener) -> Result<Box<dyn Line>, PortError> {
-        let places = match Place::all(self.key.names()) {
+        let places = match Place::all(self.key.names(), self.group) {
             Ok(places) if places.is_empty() => return open(), // it says what is wrong with the port
             Ok(places) => places,
             Err(error) => return self.open_alone(open, &error),
@@ -170,7 +176,7 @@ impl Sharing {
                     self.has_opened(line.connected_to());
                     return Ok(line);
                 }
-                Err(error) if error.kind == PortErrorKind::Busy => match silent {
+                Err(error) if matches!(error.kind, PortErrorKind::Busy | PortErrorKind::Denied) => match silent {
                     Some(message) => return Err(PortError { message, ..error }),
                     None if is_going && monotonic() < end => thread::sleep(STEP),
                     None => return Err(error),
@@ -190,7 +196,7 @@ impl Sharing {
 
     /// Opens the port where nobody could be met over it.
     fn open_alone(&self, open: &mut Opener, why: &std::io::Error) -> Result<Box<dyn Line>, PortError> {
-        self.serving().refused = Some(format!("other programs cannot use this port through this one: {why}"));
+        self.serving().refused = Some(not_through_this(why));
         open()
     }
 
@@ -242,9 +248,9 @@ impl Sharing {
 
     /// The port is open, and a connection to it ends at `peer` if it has such an end: that says which of its names it has.
     fn has_opened(&self, peer: Option<SocketAddr>) {
-        let places = Place::all(self.key.name_of(peer).into_iter().collect()).unwrap_or_default();
-        for place in places {
-            self.open_door(place);
+        match Place::own(self.key.name_of(peer).into_iter().collect(), self.group) {
+            Ok(places) => places.into_iter().for_each(|place| self.open_door(place)),
+            Err(error) => self.serving().refused = Some(not_through_this(&error)),
         }
         if self.takes_over.swap(false, Ordering::AcqRel) {
             thread::sleep(QUIET);
@@ -260,7 +266,7 @@ impl Sharing {
         serving.at = match place.open_door() {
             Ok(door) => Some((place, door)),
             Err(error) => {
-                serving.refused = Some(format!("other programs cannot use this port through this one: {error}"));
+                serving.refused = Some(not_through_this(&error));
                 None
             }
         };
@@ -280,7 +286,7 @@ impl Sharing {
         match Host::open(door, Arc::clone(&self.guests), Weak::clone(port)) {
             Ok(host) => serving.host = Some(host),
             Err(error) => {
-                serving.refused = Some(format!("other programs cannot use this port through this one: {error}"));
+                serving.refused = Some(not_through_this(&error));
             }
         }
     }

@@ -75,6 +75,7 @@ pub(super) trait CarriesOut: fmt::Debug + Send + Sync {
 #[derive(Debug)]
 pub(super) struct Wills {
     key: Option<PortKey>,
+    group: Option<u32>,
     characters: Characters,
     timeout: Duration,
     bus: OnceLock<Weak<dyn CarriesOut>>,
@@ -96,8 +97,8 @@ struct State {
     /// Whether a will was left of which the program that has the port was not told.
     untold: bool,
     is_attended: bool,
-    /// Where wills of the port that this bus opened last are found.
-    place: Option<Place>,
+    /// Where wills of the port that this bus opened last are found; its own are left at the first.
+    places: Vec<Place>,
     notes: Vec<String>,
 }
 
@@ -125,6 +126,7 @@ impl Wills {
     pub(super) fn new(key: Option<PortKey>, options: &BusOptions) -> Self {
         Self {
             key,
+            group: options.group,
             characters: Characters::of(&options.format),
             timeout: options.timeout,
             bus: OnceLock::new(),
@@ -140,8 +142,7 @@ impl Wills {
         Box::new(move || {
             let line = open()?;
             let name = wills.key.as_ref().and_then(|key| key.name_of(line.connected_to()));
-            wills.lock().place =
-                Place::all(name.into_iter().collect()).ok().and_then(|places| places.into_iter().next());
+            wills.lock().places = Place::all(name.into_iter().collect(), wills.group).unwrap_or_default();
             wills.look(Some(FRESH));
             Ok(line)
         })
@@ -170,8 +171,13 @@ impl Wills {
     /// Takes up the wills whose programs are gone: where it says so, those that were alive not longer ago. Whether there
     /// are others.
     fn look(self: &Arc<Self>, fresh: Option<Duration>) -> bool {
-        let Some(place) = self.lock().place.clone() else { return false };
-        let Ok(Found { orphans, living }) = find(&place) else { return false };
+        let places = self.lock().places.clone();
+        let found: Vec<Found> = places.iter().filter_map(|place| find(place).ok()).collect();
+        if found.is_empty() {
+            return false;
+        }
+        let living = found.iter().map(|found| found.living).sum();
+        let orphans = found.into_iter().flat_map(|found| found.orphans);
         let mut state = self.lock();
         state.living = living;
         let now = monotonic();
@@ -289,7 +295,7 @@ impl Wills {
     /// Where whoever has the port looks: the program through which this bus uses it, or this one.
     fn place(&self) -> Option<Place> {
         let there = self.bus.get().and_then(Weak::upgrade).and_then(|bus| bus.place());
-        there.or_else(|| self.lock().place.clone())
+        there.or_else(|| self.lock().places.first().cloned())
     }
 
     /// Leaves `last` where the one who has the port finds it. `None` where nobody could.

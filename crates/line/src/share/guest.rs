@@ -159,6 +159,7 @@ impl Guest {
             Ok(stream) => stream,
             Err(Nobody::Absent) => return Knocked::Absent,
             Err(Nobody::Gone) => return Knocked::Gone,
+            Err(Nobody::NotForUs(why)) => return Knocked::Silent(why),
             Err(Nobody::Crowded) => return Knocked::Silent(crowded(SILENT)),
         };
         match greet(stream, hello, None, SILENT) {
@@ -211,6 +212,7 @@ impl Guest {
         let stream = self.place.knock(monotonic() + patience).map_err(|nobody| match nobody {
             Nobody::Absent | Nobody::Gone => Greeting::Gone,
             Nobody::Crowded => Greeting::Silent(crowded(patience)),
+            Nobody::NotForUs(why) => Greeting::SentAway(why),
         })?;
         greet(stream, hello, Some(&self.life), patience).map(|(channel, ..)| channel)
     }
@@ -364,9 +366,6 @@ fn greet(
     patience: Duration,
 ) -> Result<(Channel, Welcome, Arc<Life>), Greeting> {
     let peer = process::peer(&stream);
-    if peer.is_this_user == Some(false) {
-        return Err(Greeting::SentAway("the socket of this port is another user's".to_owned()));
-    }
     let gone = |_: io::Error| Greeting::Gone;
     let life = known.map_or_else(|| Arc::new(Life::of(peer.process)), Arc::clone);
     if life.is_gone() {

@@ -1,17 +1,12 @@
-//! Where the programs of one user meet over a port: a socket named after the port, in a folder that is always the same.
+//! Where programs meet over a port: a socket named after the port, in a [folder](super::folder) of one user or of a group.
 //!
-//! No variable says where: a program that cron starts, a service and one in a terminal have different ones, and have to
-//! meet. So `/run/user`, which comes and goes with who is logged in, is not used. Only `DRIVEBUS_RUNTIME_DIR` puts the folder
-//! elsewhere, for tests and for containers that are given another one.
-//!
-//! The folder is this user's alone (0700), so that no other user reaches what is in it; whose program is at the other end
-//! is asked of the system all the same. On Linux the socket has a second name, without a file, for who has another `/tmp`
-//! (`PrivateTmp` of a service): there the system has to know whose program it is. A lock beside the socket lets one program
-//! at a time open the port or knock, so that nobody finds a port that is taken and no socket yet.
+//! Whose program is at the other end is asked of the system, too. On Linux the socket of a user has a second name, without a
+//! file, for who has another `/tmp` (`PrivateTmp` of a service): there the system has to know whose program it is. A lock beside
+//! the socket lets one program at a time open the port or knock, so that nobody finds a port that is taken and no socket yet.
 
-use std::fs::{self, DirBuilder, File, OpenOptions, Permissions};
+use std::fs::{self, File, OpenOptions, Permissions};
 use std::io;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,15 +14,14 @@ use std::thread;
 use std::time::Duration;
 
 use drivebus_rtu::Instant;
-use rustix::fs::{FlockOperation, flock};
+use rustix::fs::{FlockOperation, OFlags, flock};
 use rustix::process::geteuid;
 
+use crate::share::folder::{group_named, of_group, of_machine, of_user};
 use crate::system::clock::monotonic;
 use crate::system::inherited::Kept;
-use crate::system::process::{Process, peer};
+use crate::system::process::{Peer, Process, peer};
 
-/// The variable that puts the folder elsewhere.
-const ELSEWHERE: &str = "DRIVEBUS_RUNTIME_DIR";
 /// How long another program may take to open the port or to find out who has it.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// How often it is looked whether it is done.
@@ -40,6 +34,8 @@ pub(crate) struct Place {
     name: String,
     /// The name without a file, where there is one.
     nameless: Option<String>,
+    /// Whether those of a group meet there, beside the programs of one user.
+    is_of_group: bool,
 }
 
 /// The right to open the port, or to knock. The system takes it back from a program that dies.
@@ -60,8 +56,17 @@ pub(crate) struct Door {
 #[derive(Debug)]
 pub(crate) struct Entrance {
     pub(crate) listener: Kept<UnixListener>,
-    /// Whether nobody but this user reaches it.
-    pub(crate) is_private: bool,
+    pub(crate) reached_by: ReachedBy,
+}
+
+/// Who reaches an entrance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ReachedBy {
+    /// This user's programs alone.
+    ThisUser,
+    /// Those of a group, too: the system lets nobody else connect.
+    Group,
+    Anybody,
 }
 
 /// Why nobody opened.
@@ -71,33 +76,53 @@ pub(crate) enum Nobody {
     Absent,
     /// One did, and is gone or about to be.
     Gone,
+    /// One may, and this user is not to come in: why.
+    NotForUs(String),
     /// One does, and so many knock already that nobody hears this one.
     #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only on Linux it is known before somebody opens"))]
     Crowded,
 }
 
 impl Place {
-    /// The places of the ports that are called `names`, in one order for everybody.
+    /// Where the program may stand that has one of the ports which are called `names`, in one order for everybody: where this
+    /// one [would](Self::own), and beside that where a group meets.
     ///
     /// # Errors
     ///
-    /// There is no folder that is this user's alone.
-    pub(crate) fn all(mut names: Vec<String>) -> io::Result<Vec<Self>> {
-        names.sort_unstable();
-        names.dedup();
-        let (folder, is_fixed) = folder()?;
+    /// As of [`own`](Self::own).
+    pub(crate) fn all(names: Vec<String>, group: Option<u32>) -> io::Result<Vec<Self>> {
+        let mut places = Self::own(names.clone(), group)?;
+        if let (None, Some(folder)) = (group, of_machine()) {
+            let there =
+                in_order(names).map(|name| Self { folder: folder.clone(), name, nameless: None, is_of_group: true });
+            places.extend(there.filter(|place| fs::symlink_metadata(place.path("sock")).is_ok()));
+        }
+        Ok(places)
+    }
+
+    /// Where this program lets others in, which serves `group` or else its own user's programs alone.
+    ///
+    /// # Errors
+    ///
+    /// There is no folder that is this user's, or the group's.
+    pub(crate) fn own(names: Vec<String>, group: Option<u32>) -> io::Result<Vec<Self>> {
+        let (folder, is_fixed) = match group {
+            Some(group) => (of_group(group)?, false),
+            None => of_user()?,
+        };
         let nameless = |name: &str| format!("drivebus-{}-{name}", geteuid().as_raw());
         let place = |name: String| Self {
             folder: folder.clone(),
             nameless: (is_fixed && cfg!(target_os = "linux")).then(|| nameless(&name)),
             name,
+            is_of_group: group.is_some(),
         };
-        Ok(names.into_iter().map(place).collect())
+        Ok(in_order(names).map(place).collect())
     }
 
     #[cfg(test)]
     pub(crate) fn in_folder(folder: PathBuf, name: &str) -> Self {
-        Self { folder, name: name.to_owned(), nameless: None }
+        Self { folder, name: name.to_owned(), nameless: None, is_of_group: false }
     }
 
     /// The file of this port with such an ending.
@@ -105,10 +130,32 @@ impl Place {
         self.folder.join(format!("{}.{ending}", self.name))
     }
 
+    /// What a file here allows: nobody else than who meets here reads or writes it.
+    const fn mode(&self) -> u32 {
+        if self.is_of_group { 0o660 } else { 0o600 }
+    }
+
+    /// The file of this port with such an ending, made anew if `is_new`. What somebody else put in its place is not followed.
+    pub(crate) fn file(&self, ending: &str, is_new: bool) -> io::Result<File> {
+        let mut options = OpenOptions::new();
+        options.read(true).write(true).mode(self.mode()).custom_flags(OFlags::NOFOLLOW.bits().cast_signed());
+        let file = options.create(!is_new).create_new(is_new).open(self.path(ending))?;
+        let status = file.metadata()?;
+        if self.is_of_group && status.uid() == geteuid().as_raw() && status.mode() & 0o777 != self.mode() {
+            // What the user's mask took away.
+            file.set_permissions(Permissions::from_mode(self.mode()))?;
+        }
+        Ok(file)
+    }
+
     /// Waits until no other program opens this port or knocks. `None` where one takes too long: then it is gone on without.
     pub(crate) fn turn(&self) -> io::Result<Option<Turn>> {
-        let options = OpenOptions::new().create(true).append(true).mode(0o600).clone();
-        let file = Kept::opened(|| options.open(self.path("lock")))?;
+        let file = match Kept::opened(|| self.file("lock", false)) {
+            Ok(file) => file,
+            // Who may not come in need not wait either.
+            Err(_) if self.is_of_group => return Ok(None),
+            Err(error) => return Err(error),
+        };
         let end = monotonic() + PATIENCE;
         while flock(&*file, FlockOperation::NonBlockingLockExclusive).is_err() {
             if monotonic() >= end {
@@ -127,13 +174,14 @@ impl Place {
             _ => {}
         }
         let listener = UnixListener::bind(&path)?;
-        fs::set_permissions(&path, Permissions::from_mode(0o600))?;
+        fs::set_permissions(&path, Permissions::from_mode(self.mode()))?;
         listener.set_nonblocking(true)?;
         let file = file_of(&path)?;
-        let first = Entrance { listener: Kept::new(listener), is_private: true };
+        let reached_by = if self.is_of_group { ReachedBy::Group } else { ReachedBy::ThisUser };
+        let first = Entrance { listener: Kept::new(listener), reached_by };
         // Where somebody has the other name, those who see the file come in all the same.
         let second = self.nameless.as_deref().and_then(|name| nameless::listen(name).ok());
-        let second = second.map(|listener| Entrance { listener: Kept::new(listener), is_private: false });
+        let second = second.map(|listener| Entrance { listener: Kept::new(listener), reached_by: ReachedBy::Anybody });
         Ok(Door {
             entrances: std::iter::once(first).chain(second).collect(),
             path,
@@ -149,7 +197,7 @@ impl Place {
             let found = match (by_file, &self.nameless) {
                 (Err(none @ (Nobody::Absent | Nobody::Gone)), Some(name)) => match nameless::connect(name) {
                     // What anybody may have put there counts where it is this user's.
-                    Ok(stream) if peer(&stream).is_this_user == Some(true) => Ok(stream),
+                    Ok(stream) if peer(&stream).user == Some(geteuid().as_raw()) => Ok(stream),
                     Err(Nobody::Crowded) => Err(Nobody::Crowded),
                     Ok(_) | Err(_) => Err(none),
                 },
@@ -157,9 +205,32 @@ impl Place {
             };
             match found {
                 Err(Nobody::Crowded) if monotonic() < until => thread::sleep(STEP),
+                Err(Nobody::NotForUs(_)) => return Err(Nobody::NotForUs(self.whom_it_is_for())),
+                Ok(stream) if !self.trusts(&peer(&stream)) => {
+                    let folder = self.folder.display();
+                    let why = format!("what stands in {folder} for this port is not of the user whose folder that is");
+                    return Err(Nobody::NotForUs(why));
+                }
                 found => return found,
             }
         }
+    }
+
+    /// Whether who stands here may be asked: the same user, and where a group meets, the user whose folder it is.
+    pub(crate) fn trusts(&self, peer: &Peer) -> bool {
+        let host = || fs::symlink_metadata(&self.folder).map(|folder| folder.uid());
+        match peer.user {
+            Some(user) if self.is_of_group => user == 0 || host().is_ok_and(|host| host == user),
+            Some(user) => user == geteuid().as_raw(),
+            // It stands where nobody else could put it.
+            None => true,
+        }
+    }
+
+    fn whom_it_is_for(&self) -> String {
+        let group = fs::symlink_metadata(self.path("sock")).map(|socket| group_named(socket.gid()));
+        let group = group.unwrap_or_else(|_| "another group".to_owned());
+        format!("this port is served to the users of {group}, and this one is not among them: `groups` says who is")
     }
 
     /// Whether `door` is the one that stands here.
@@ -178,49 +249,16 @@ impl Drop for Door {
     }
 }
 
+/// Each of `names` once, in the order that all programs have.
+fn in_order(mut names: Vec<String>) -> impl Iterator<Item = String> {
+    names.sort_unstable();
+    names.dedup();
+    names.into_iter()
+}
+
 /// Which file stands at `path`.
 fn file_of(path: &Path) -> io::Result<(u64, u64)> {
     fs::symlink_metadata(path).map(|status| (status.dev(), status.ino()))
-}
-
-/// The folder for the sockets of this user's programs, made where it is missing; nobody else can look into it.
-///
-/// It is `/tmp/drivebus-UID` in every program, whatever its environment; `DRIVEBUS_RUNTIME_DIR` puts it elsewhere.
-///
-/// # Errors
-///
-/// It cannot be made, or is not this user's alone.
-pub fn run_time_folder() -> io::Result<PathBuf> {
-    folder().map(|(folder, _)| folder)
-}
-
-/// The folder, and whether it is the one that is always the same.
-fn folder() -> io::Result<(PathBuf, bool)> {
-    let user = geteuid().as_raw();
-    let elsewhere = std::env::var_os(ELSEWHERE).filter(|given| !given.is_empty()).map(PathBuf::from);
-    let (folder, is_fixed) = match elsewhere {
-        Some(given) if given.is_absolute() && is_of(&given, user) => (given.join("drivebus"), false),
-        Some(given) => {
-            let why = format!("{ELSEWHERE} is {}, which is no folder of this user's", given.display());
-            return Err(io::Error::new(io::ErrorKind::PermissionDenied, why));
-        }
-        None => (PathBuf::from(format!("/tmp/drivebus-{user}")), true),
-    };
-    match DirBuilder::new().mode(0o700).create(&folder) {
-        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(error),
-        _ => {}
-    }
-    let is_private = fs::symlink_metadata(&folder)
-        .is_ok_and(|status| status.is_dir() && status.uid() == user && status.mode() & 0o777 == 0o700);
-    if !is_private {
-        let why = format!("{} is not a folder of this user's alone (mode 0700)", folder.display());
-        return Err(io::Error::new(io::ErrorKind::PermissionDenied, why));
-    }
-    Ok((folder, is_fixed))
-}
-
-fn is_of(path: &Path, user: u32) -> bool {
-    fs::metadata(path).is_ok_and(|status| status.is_dir() && status.uid() == user)
 }
 
 /// Names without a file, which all programs see that share a network.
@@ -273,6 +311,7 @@ mod connect {
         match address.and_then(|address| rustix::net::connect(&socket, &address)) {
             Ok(()) => Ok(UnixStream::from(socket)),
             Err(Errno::NOENT) => Err(Nobody::Absent),
+            Err(Errno::ACCESS) => Err(Nobody::NotForUs(String::new())),
             Err(Errno::AGAIN) => Err(Nobody::Crowded),
             Err(_) => Err(Nobody::Gone),
         }
@@ -286,6 +325,7 @@ mod connect {
     pub(super) fn to_file(path: &Path) -> Result<UnixStream, Nobody> {
         UnixStream::connect(path).map_err(|error| match error.kind() {
             io::ErrorKind::NotFound => Nobody::Absent,
+            io::ErrorKind::PermissionDenied => Nobody::NotForUs(String::new()),
             _ => Nobody::Gone,
         })
     }

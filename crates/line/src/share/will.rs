@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use drivebus_rtu::Instant;
-use rustix::fs::{FlockOperation, fcntl_lock};
+use rustix::fs::{FlockOperation, OFlags, fcntl_lock};
 use serde::{Deserialize, Serialize};
 
 use crate::share::message::Characters;
@@ -95,8 +95,8 @@ impl Paper {
         for number in 0.. {
             let name = format!("{}-{}-{number}", std::process::id(), now.as_nanos());
             // Nobody looks for it under this name: found without a lock it would be taken for an orphan.
-            let draft = place.path(&format!("{name}.draft"));
-            let file = match OpenOptions::new().read(true).write(true).create_new(true).mode(0o600).open(&draft) {
+            let draft = format!("{name}.draft");
+            let file = match place.file(&draft, true) {
                 Ok(file) => file,
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
                 Err(error) => return Err(error),
@@ -104,7 +104,7 @@ impl Paper {
             fcntl_lock(&file, FlockOperation::NonBlockingLockExclusive)?;
             file.write_all_at(&bytes, 0)?;
             let path = place.path(&format!("{name}.{ENDING}"));
-            fs::rename(&draft, &path)?;
+            fs::rename(place.path(&draft), &path)?;
             held.insert(path.clone());
             return Ok(Self { file, path, held_by: Process::current() });
         }
@@ -182,7 +182,13 @@ fn all(place: &Place) -> io::Result<Vec<PathBuf>> {
 
 /// The will at `path`, if nobody holds it.
 fn take(path: &Path) -> io::Result<Option<Orphan>> {
-    let file = OpenOptions::new().read(true).write(true).open(path)?;
+    // Whatever else somebody put there under such a name is neither followed nor waited for.
+    let as_it_is = (OFlags::NOFOLLOW | OFlags::NONBLOCK).bits().cast_signed();
+    let file = OpenOptions::new().read(true).write(true).custom_flags(as_it_is).open(path)?;
+    let status = file.metadata()?;
+    if !status.is_file() || status.nlink() != 1 {
+        return Err(io::ErrorKind::InvalidData.into());
+    }
     if fcntl_lock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
         return Ok(None);
     }

@@ -36,6 +36,12 @@ pub(crate) fn is_stopped(process: u32) -> bool {
     status.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with(['T', 't']))
 }
 
+/// The number of this program's user.
+#[cfg(all(unix, feature = "share"))]
+pub(crate) fn user() -> u32 {
+    rustix::process::geteuid().as_raw()
+}
+
 /// Who is at the other end of a socket.
 #[cfg(all(unix, feature = "share"))]
 #[derive(Debug, Clone, Copy)]
@@ -43,8 +49,8 @@ pub(crate) struct Peer {
     /// 0 where the system does not tell: on systems that have no such question, and of a process that has no number here
     /// because it is outside of this container.
     pub(crate) process: u32,
-    /// `None` where the system does not tell.
-    pub(crate) is_this_user: Option<bool>,
+    /// The number of its user; `None` where the system does not tell.
+    pub(crate) user: Option<u32>,
 }
 
 /// Who is at the other end of `stream`: who called `connect`, or who called `listen`.
@@ -53,16 +59,16 @@ pub(crate) fn peer(stream: &std::os::unix::net::UnixStream) -> Peer {
     match rustix::net::sockopt::socket_peercred(stream) {
         Ok(found) => Peer {
             process: u32::try_from(found.pid.as_raw_nonzero().get()).unwrap_or(0),
-            is_this_user: Some(found.uid == rustix::process::geteuid()),
+            user: Some(found.uid.as_raw()),
         },
-        Err(_) => Peer { process: 0, is_this_user: None },
+        Err(_) => Peer { process: 0, user: None },
     }
 }
 
 /// Some program: the system does not tell which.
 #[cfg(all(unix, not(target_os = "linux"), feature = "share"))]
 pub(crate) fn peer(_stream: &std::os::unix::net::UnixStream) -> Peer {
-    Peer { process: 0, is_this_user: None }
+    Peer { process: 0, user: None }
 }
 
 /// Whether a process lives, as far as the system tells: whoever else has its descriptors, it is gone when it is.

@@ -20,14 +20,21 @@ pub(crate) struct Door {
     pub(crate) entrances: Arc<[Entrance]>,
 }
 
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum ReachedBy {
+    ThisUser,
+    Group,
+    Anybody,
+}
+
 #[derive(Debug)]
 pub(crate) struct Entrance {
     pub(crate) listener: Kept<UnixListener>,
-    pub(crate) is_private: bool,
+    pub(crate) reached_by: ReachedBy,
 }
 
 impl Door {
     pub(crate) fn new(listener: UnixListener) -> Self {
-        Self { entrances: Arc::new([Entrance { listener: Kept::new(listener), is_private: true }]) }
+        Self { entrances: Arc::new([Entrance { listener: Kept::new(listener), reached_by: ReachedBy::ThisUser }]) }
     }
 }

@@ -19,15 +19,19 @@ pub(crate) fn own_name() -> String {
     String::from("schedules")
 }
 
+pub(crate) fn user() -> u32 {
+    0
+}
+
 /// Who is at the other end.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Peer {
     pub(crate) process: u32,
-    pub(crate) is_this_user: Option<bool>,
+    pub(crate) user: Option<u32>,
 }
 
 pub(crate) fn peer(stream: &UnixStream) -> Peer {
-    Peer { process: stream.other(), is_this_user: Some(true) }
+    Peer { process: stream.other(), user: Some(user()) }
 }
 
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::Duration;
 
-use crate::share::place::Entrance;
+use crate::share::place::{Entrance, ReachedBy};
 use crate::system::sockets::{Came, UnixStream, wait_for_a_knock};
 use crate::system::sync::thread;
 
@@ -19,7 +19,7 @@ pub(super) fn stand(
     entrances: &[Entrance],
     woken: &UnixStream,
     says: impl Fn(Option<&io::Error>),
-    mut let_in: impl FnMut(UnixStream, bool) -> io::Result<()>,
+    mut let_in: impl FnMut(UnixStream, ReachedBy) -> io::Result<()>,
 ) {
     let mut pause = Pause::default();
     loop {
@@ -40,10 +40,10 @@ pub(super) fn stand(
 }
 
 /// Lets in one at each entrance; the error is the system's that has nothing left for it.
-fn accept(entrances: &[Entrance], let_in: &mut impl FnMut(UnixStream, bool) -> io::Result<()>) -> io::Result<()> {
-    for Entrance { listener, is_private } in entrances {
+fn accept(entrances: &[Entrance], let_in: &mut impl FnMut(UnixStream, ReachedBy) -> io::Result<()>) -> io::Result<()> {
+    for Entrance { listener, reached_by } in entrances {
         match listener.accept() {
-            Ok((stream, _)) => let_in(stream, *is_private)?,
+            Ok((stream, _)) => let_in(stream, *reached_by)?,
             Err(error) => match error.kind() {
                 // Nobody knocks here, or who did has gone.
                 io::ErrorKind::WouldBlock | io::ErrorKind::ConnectionAborted | io::ErrorKind::Interrupted => {}
