@@ -179,7 +179,7 @@ def test_where_the_service_is_killed_the_next_one_halts_what_a_program_of_the_gr
 
 @needs_users
 def test_nobody_of_the_group_has_the_service_touch_what_is_elsewhere(plant: Plant) -> None:
-    """Names of wills and of the lock that lead to a file of the service's, by both kinds of links, and one that waits."""
+    """Wills and a lock that lead to a file of the service's, by both kinds of links, and one that waits."""
     with plant.service():
         [lock] = plant.machine.glob("*.lock")
     precious = plant.place / "run" / "precious"
