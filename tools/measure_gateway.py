@@ -5,9 +5,9 @@
     python -m tools.measure_gateway scan
 
 `late`: requests to a unit whose answers come after `answer_within` or not at all, and to units that are dead. None may
-be answered twice, and none after its 0BH. `dead-man`: a client sets a motor in motion and is killed, or its cable is out,
-or it is killed while its cable is out; the motor has to be at rest within `dead_man` and its ramp. `scan`: from another
-network, which ports are open that were not before. The last two need root, for a network of their own.
+be answered twice, and none after its 0BH. `dead-man`: a client sets a motor in motion and is killed, or its cable is
+out, or both; the motor has to be at rest within `dead_man` and its ramp. `scan`: from another network, which ports are
+open that were not before. The last two need root, for a network of their own.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from drivebus import Allow, Bus, Gateway, Simulator
 
 FAR, HERE, THERE = "drivebus-far", "10.99.0.1", "10.99.0.2"
-WITHIN = 0.05
+WITHIN = 0.1
 DEAD_MAN, RAMP, MARGIN = 1.0, 1.0, 0.5
 RUN = bytes.fromhex("000100000006010620000001")
 CLIENT = f"""
@@ -47,40 +47,45 @@ while True:
 
 def late(requests: int) -> dict[str, object]:
     """Asks units that are late or dead, 256 at a time, and looks at each answer that comes."""
-    chance, came, wrong = random.Random(1), Counter[str](), []
+    chance, came = random.Random(1), Counter[str]()
+    wrong: list[int] = []
     with ExitStack() as stack:
         simulator = stack.enter_context(
             Simulator({1: "gd350", 2: "vfd500"}, transport="process", baudrate=115200, seed=1)
         )
-        bus = stack.enter_context(Bus(simulator, baudrate=115200, timeout=0.2, retries=0))
+        bus = stack.enter_context(Bus(simulator, baudrate=115200, timeout=0.05, retries=0))
         drive = bus.drive(1, "gd350")
         allow = [Allow(), Allow(drives=[drive], commands=["setpoint"])]
         gateway = stack.enter_context(Gateway(bus, "127.0.0.1:0", answer_within=WITHIN, allow=allow))
         host, port = gateway.address.rsplit(":", 1)
         simulator.line.set_times(late=0.06, overtaken=(0.055, 0.2))
         simulator.line.set_faults(late=0.2, overtaken=0.2, silence=0.1)
-        asked = 0
-        while asked < requests:
-            clients = [
-                socket.create_connection((host, int(port)), source_address=(f"127.0.0.{2 + n}", 0)) for n in range(16)
-            ]
+        clients = [
+            socket.create_connection((host, int(port)), source_address=(f"127.0.0.{2 + n}", 0)) for n in range(16)
+        ]
+        heard = [Heard(client) for client in clients]
+        for number in range(requests // 256):
             for client in clients:
-                pdus = [pdu(chance) for _ in range(256)]
-                client.sendall(
-                    b"".join(struct.pack(">HHHB", n, 0, 6, each[0]) + each[1:] for n, each in enumerate(pdus))
-                )
-                asked += len(pdus)
-            time.sleep(2 * WITHIN)
-            for client in clients:
-                client.shutdown(socket.SHUT_WR)
-                seen = Counter[int]()
-                for transaction, answer in answers(client):
-                    seen[transaction] += 1
-                    came["right" if not answer[0] & 0x80 else f"{answer[1]:02X}H"] += 1
-                wrong += [f"{transaction} {times} times" for transaction, times in seen.items() if times > 1]
-                client.close()
+                pdus = enumerate((pdu(chance) for _ in range(16)), number % 4096 * 16)
+                client.sendall(b"".join(struct.pack(">HHHB", n, 0, 6, each[0]) + each[1:] for n, each in pdus))
+            for one in heard:
+                open_ones = set(range(number % 4096 * 16, number % 4096 * 16 + 16))
+                while open_ones:
+                    transaction, answer = one.next()
+                    if transaction in open_ones:
+                        open_ones.remove(transaction)
+                        came["right" if not answer[0] & 0x80 else f"{answer[1]:02X}H"] += 1
+                    else:
+                        wrong.append(transaction)
+        # What still comes belongs to nothing.
+        bus.sleep(1.0)
+        for client, one in zip(clients, heard, strict=True):
+            client.shutdown(socket.SHUT_WR)
+            with suppress(EOFError):
+                while True:
+                    wrong.append(one.next()[0])
         stats = gateway.stats
-    return {"asked": asked, "answers": dict(came), "late": stats.late, "answered twice": len(wrong)}
+    return {"asked": sum(came.values()), "answers": dict(came), "late": stats.late, "answers of nothing": len(wrong)}
 
 
 def pdu(chance: random.Random) -> bytes:
@@ -91,15 +96,23 @@ def pdu(chance: random.Random) -> bytes:
     return bytes([unit]) + struct.pack(">BHH", 3, 0x2103 if unit == 1 else 0x3000, 1)
 
 
-def answers(client: socket.socket) -> Iterator[tuple[int, bytes]]:
-    """Each transaction that is answered, with the PDU."""
-    came = b""
-    while piece := client.recv(65536):
-        came += piece
-    while len(came) >= 6:
-        transaction, _, length = struct.unpack(">HHH", came[:6])
-        yield transaction, came[7 : 6 + length]
-        came = came[6 + length :]
+class Heard:
+    """What comes to one client."""
+
+    def __init__(self, client: socket.socket) -> None:
+        self._client = client
+        self._came = b""
+
+    def next(self) -> tuple[int, bytes]:
+        """The next answer: its transaction and its PDU. EOFError: none comes any more."""
+        while len(self._came) < 6 or len(self._came) < 6 + int.from_bytes(self._came[4:6], "big"):
+            piece = self._client.recv(65536)
+            if not piece:
+                raise EOFError
+            self._came += piece
+        transaction, _, length = struct.unpack(">HHH", self._came[:6])
+        pdu, self._came = self._came[7 : 6 + length], self._came[6 + length :]
+        return transaction, pdu
 
 
 @contextmanager
