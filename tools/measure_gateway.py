@@ -31,6 +31,7 @@ from drivebus import Allow, Bus, Gateway, Simulator
 
 FAR, HERE, THERE = "drivebus-far", "10.99.0.1", "10.99.0.2"
 WITHIN = 0.1
+CLIENTS, AT_ONCE = 4, 4
 DEAD_MAN, RAMP, MARGIN = 1.0, 1.0, 0.5
 RUN = bytes.fromhex("000100000006010620000001")
 CLIENT = f"""
@@ -46,7 +47,7 @@ while True:
 
 
 def late(requests: int) -> dict[str, object]:
-    """Asks units that are late or dead, 256 at a time, and looks at each answer that comes."""
+    """Asks units that are late or dead, 16 at a time, and looks at each answer that comes."""
     chance, came = random.Random(1), Counter[str]()
     wrong: list[int] = []
     with ExitStack() as stack:
@@ -59,17 +60,17 @@ def late(requests: int) -> dict[str, object]:
         gateway = stack.enter_context(Gateway(bus, "127.0.0.1:0", answer_within=WITHIN, allow=allow))
         host, port = gateway.address.rsplit(":", 1)
         simulator.line.set_times(late=0.06, overtaken=(0.055, 0.2))
-        simulator.line.set_faults(late=0.2, overtaken=0.2, silence=0.1)
+        simulator.line.set_faults(late=0.1, overtaken=0.1, silence=0.05)
         clients = [
-            socket.create_connection((host, int(port)), source_address=(f"127.0.0.{2 + n}", 0)) for n in range(16)
+            socket.create_connection((host, int(port)), source_address=(f"127.0.0.{2 + n}", 0)) for n in range(CLIENTS)
         ]
         heard = [Heard(client) for client in clients]
-        for number in range(requests // 256):
+        for number in range(requests // (CLIENTS * AT_ONCE)):
             for client in clients:
-                pdus = enumerate((pdu(chance) for _ in range(16)), number % 4096 * 16)
+                pdus = enumerate((pdu(chance) for _ in range(AT_ONCE)), number % 4096 * AT_ONCE)
                 client.sendall(b"".join(struct.pack(">HHHB", n, 0, 6, each[0]) + each[1:] for n, each in pdus))
             for one in heard:
-                open_ones = set(range(number % 4096 * 16, number % 4096 * 16 + 16))
+                open_ones = set(range(number % 4096 * AT_ONCE, (number % 4096 + 1) * AT_ONCE))
                 while open_ones:
                     transaction, answer = one.next()
                     if transaction in open_ones:
@@ -90,7 +91,7 @@ def late(requests: int) -> dict[str, object]:
 
 def pdu(chance: random.Random) -> bytes:
     """A unit and a read of it, or a setpoint."""
-    unit = chance.choice([1, 1, 2, 9, 10])
+    unit = chance.choice([1, 1, 1, 1, 2, 2, 2, 2, 9])
     if unit == 1 and chance.random() < 0.2:
         return bytes([unit]) + struct.pack(">BHH", 6, 0x2001, chance.randrange(5000))
     return bytes([unit]) + struct.pack(">BHH", 3, 0x2103 if unit == 1 else 0x3000, 1)
