@@ -674,6 +674,7 @@ class Gateway:
         within: float,
         /,
         *,
+        rtu: bool,
         rules: list[tuple[list[str], list[int], list[int], list[_Writable]]],
         units: list[tuple[int, list[_Writable], list[list[bytes]], tuple[bytes, Sequence[bytes]] | None]],
         dead_man: float | None,

@@ -26,6 +26,8 @@ MOST_WITHIN = 60.0
 DEAD_MAN = (0.1, 3600.0)
 """Seconds of silence after which a motor may be halted."""
 
+FRAMINGS = ("tcp", "rtu")
+
 _Rule = tuple[list[str], list[int], list[int], list[network_rights.Writable]]
 
 
@@ -92,7 +94,7 @@ class GatewayStats(NamedTuple):
 
 @known_only
 class Gateway:
-    """A server for Modbus TCP before a bus: other programs read its units, in its queue. Until it is closed.
+    """A server for Modbus TCP before a bus: other programs use its units, in its queue. Until it is closed.
 
         with drivebus.Bus("/dev/ttyUSB0") as bus, drivebus.Gateway(bus, "127.0.0.1:1502") as gateway:
             gateway.wait()
@@ -120,6 +122,8 @@ class Gateway:
     Args:
         bus: The line. It stays the caller's to close; where it is closed, clients are told 0AH.
         address: `host:port`, such as `127.0.0.1:1502` or `[::1]:1502`. Port 0 takes one that is free.
+        framing: `"tcp"` is Modbus TCP. `"rtu"` is RTU over TCP, as on a line: one request of a connection at a time,
+            and no answer to what is for all units.
         answer_within: Seconds until an answer goes out at the latest, 0.05..60.
         allow: What clients may do. Empty: all may read. Drives that answer are asked who they are.
         dead_man: Seconds, 0.1..3600: a motor is halted when the client that set it in motion has hung up, or has asked
@@ -138,6 +142,7 @@ class Gateway:
         bus: Bus,
         address: str,
         *,
+        framing: Literal["tcp", "rtu"] = "tcp",
         answer_within: float = 1.0,
         allow: Sequence[Allow] = (),
         dead_man: float | Literal["off"] | None = None,
@@ -161,6 +166,7 @@ class Gateway:
             core,
             address,
             within,
+            rtu=checks.one_of("framing", framing, FRAMINGS) == "rtu",
             rules=rules,
             units=list(_halts(allow)),
             dead_man=silence,

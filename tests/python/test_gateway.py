@@ -27,7 +27,7 @@ import drivebus
 from drivebus import Bus, Gateway, Simulator
 
 from .conftest import NO_PTY
-from .tcp_client import HERE, answer, connected, is_cut_off, request, seen
+from .tcp_client import HERE, answer, connected, exactly, is_cut_off, request, seen
 
 IS = 0x01A0
 """What a GD350 answers at 2103H."""
@@ -237,6 +237,26 @@ def test_an_answer_that_is_late_never_comes() -> None:
         client.sendall(request(2, 1, b"\x03\x63\x00\x00\x7e"))
         assert answer(client) == (2, 1, b"\x83\x03")
     assert gateway.stats.late == 1
+
+
+def rtu(unit: int, pdu: bytes) -> bytes:
+    frame = bytes([unit]) + pdu
+    return frame + struct.pack("<H", drivebus.crc16(frame))
+
+
+def test_rtu_over_tcp_one_after_the_other(bus: Bus) -> None:
+    """Answers come in the order of the requests, though the first unit is silent; drivebus itself is a client, too."""
+    read = b"\x03\x21\x03\x00\x01"
+    with Gateway(bus, HERE, framing="rtu", answer_within=20.0) as gateway:
+        with connected(gateway) as client:
+            client.sendall(rtu(9, read) + rtu(1, read) + rtu(1, b"\x06\x20\x00\x00\x01") + rtu(2, b"\x41\x01"))
+            expected = rtu(9, b"\x83\x0b") + rtu(1, b"\x03\x02\x01\xa0") + rtu(1, b"\x86\x01") + rtu(2, b"\xc1\x01")
+            assert exactly(client, len(expected)) == expected
+            client.sendall(rtu(1, read)[:-1] + b"\0")
+            assert is_cut_off(client)
+        assert "a CRC that is wrong" in gateway.told()[-1]
+        with Bus(f"socket://{gateway.address}") as other:
+            assert other.read(1, 0x2103) == [IS]
 
 
 def test_of_seventeen_from_one_host_one_gives_way(gateway: Gateway) -> None:

@@ -1,4 +1,4 @@
-//! Modbus TCP, served: programs that speak it read the units of a line, in the queue of the bus that has it.
+//! Modbus TCP, served, and RTU over TCP: programs that speak it read the units of a line, in the queue of the bus that has it.
 //!
 //! Each connection is a program of the queue: one that asks much takes no more turns than one that asks little, and a stop
 //! goes before them all. What cannot be answered in time is answered by 0BH, and never afterwards for that transaction; what
@@ -7,7 +7,8 @@
 //!
 //! | room | what is in it |
 //! | --- | --- |
-//! | `requests` | what clients send, taken apart |
+//! | `asked`, `framing`, `requests` | what clients send, and how they are answered |
+//! | `tcp_request`, `rtu_request` | one request, taken out of what comes |
 //! | `network`, `rights` | what they may ask |
 //! | `wear` | how often they may write what wears a drive |
 //! | `commanders` | who commanded motion: a dead man's switch |
@@ -21,6 +22,7 @@
 //!
 //! Source: *Modbus Messaging on TCP/IP Implementation Guide* V1.0b, §3.1.3 and §4.4.
 
+mod asked;
 mod audit;
 mod clerk;
 mod clients;
@@ -29,11 +31,14 @@ mod common;
 mod connection;
 mod counts;
 mod desk;
+mod framing;
 mod mailbox;
 mod network;
 mod reader;
 mod requests;
 mod rights;
+mod rtu_request;
+mod tcp_request;
 mod together;
 mod wear;
 mod writing;
@@ -46,9 +51,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+pub use asked::{Asked, NotModbus};
 pub use counts::GatewayStats;
+pub use framing::Framing;
 pub use network::{Network, NoNetwork};
-pub use requests::{Asked, NotModbus, Requests};
+pub use requests::Requests;
 pub use rights::{Halts, Means, READS, Rights, Rule, WRITES, Writable};
 
 use crate::bus::Bus;
@@ -74,6 +81,8 @@ const TO_END: Duration = Duration::from_secs(1);
 pub struct GatewayOptions {
     /// How long an answer may take.
     pub answer_within: Duration,
+    /// What clients speak.
+    pub framing: Framing,
     /// What clients may do.
     pub rights: Rights,
     /// What becomes of a motor whose client is gone or silent. Has to be said where clients may move one.
@@ -94,11 +103,17 @@ pub enum DeadMan {
 impl Default for GatewayOptions {
     /// Answers within a second, reads only, no audit.
     fn default() -> Self {
-        Self { answer_within: ANSWER_WITHIN, rights: Rights::default(), dead_man: None, audit: None }
+        Self {
+            answer_within: ANSWER_WITHIN,
+            framing: Framing::Tcp,
+            rights: Rights::default(),
+            dead_man: None,
+            audit: None,
+        }
     }
 }
 
-/// A server for Modbus TCP before a [`Bus`], until it is dropped. It keeps the bus from nothing: where that is closed, clients
+/// A server for Modbus TCP, or for RTU over TCP, before a [`Bus`], until it is dropped. It keeps the bus from nothing: where that is closed, clients
 /// are told 0AH.
 ///
 /// ```no_run
@@ -129,7 +144,7 @@ impl Gateway {
     /// The system's: the address is not one of this machine, is taken, or may not be listened at; the audit cannot be written.
     /// [`io::ErrorKind::InvalidInput`]: clients may move a motor, and nothing says what becomes of it when they are gone.
     pub fn open(bus: &Arc<Bus>, address: &str, options: GatewayOptions) -> io::Result<Self> {
-        let GatewayOptions { answer_within: within, rights, dead_man, audit } = options;
+        let GatewayOptions { answer_within: within, framing, rights, dead_man, audit } = options;
         if rights.moves_any() && dead_man.is_none() {
             return Err(io::Error::new(
                 io::ErrorKind::InvalidInput,
@@ -152,6 +167,7 @@ impl Gateway {
         let common = Common {
             bus: Arc::downgrade(bus),
             within,
+            framing,
             rights,
             dead_man: match dead_man {
                 Some(DeadMan::After(silence)) => Some(silence),

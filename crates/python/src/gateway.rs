@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use drivebus_line::gateway::{
-    DeadMan, Gateway as CoreGateway, GatewayOptions, Halts, Means, Network, Rights, Rule, Writable,
+    DeadMan, Framing, Gateway as CoreGateway, GatewayOptions, Halts, Means, Network, Rights, Rule, Writable,
 };
 use drivebus_line::{LastWill, PortError, PortErrorKind};
 use drivebus_rtu::UnitAddress;
@@ -66,11 +66,13 @@ pub(crate) struct Gateway {
 #[pymethods]
 impl Gateway {
     #[new]
-    #[pyo3(signature = (bus, address, within, /, *, rules, units, dead_man, audit))]
+    #[expect(clippy::too_many_arguments, reason = "the keywords of the Python class")]
+    #[pyo3(signature = (bus, address, within, /, *, rtu, rules, units, dead_man, audit))]
     fn new(
         bus: &Bound<'_, Bus>,
         address: &str,
         within: f64,
+        rtu: bool,
         rules: Vec<GivenRule>,
         units: Vec<GivenHalts>,
         dead_man: Option<f64>,
@@ -78,6 +80,7 @@ impl Gateway {
     ) -> PyResult<Self> {
         let mut options = GatewayOptions::default();
         options.answer_within = duration("answer_within", within)?;
+        options.framing = if rtu { Framing::Rtu } else { Framing::Tcp };
         if !rules.is_empty() {
             options.rights = rights(rules, units)?;
         }

@@ -153,8 +153,15 @@ class _Served:
         drives: dict[str, Drive] = {}
         allow = [_allowed(bus, each, drives) for each in tcp.allow]
         audit = self._site.share.audit
-        within, dead_man = tcp.answer_within, tcp.dead_man
-        return Gateway(bus, tcp.address, answer_within=within, allow=allow, dead_man=dead_man, audit=audit)
+        return Gateway(
+            bus,
+            tcp.address,
+            framing=tcp.framing,
+            answer_within=tcp.answer_within,
+            allow=allow,
+            dead_man=tcp.dead_man,
+            audit=audit,
+        )
 
     def _close(self) -> None:
         self._open = None

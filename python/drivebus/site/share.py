@@ -26,7 +26,7 @@ from typing import Any, Literal
 
 from drivebus import checks
 from drivebus.site.entries import SiteDrive, SiteLine
-from drivebus.site.reading import Key, Reading, Wrong, flag, listed, number, quoted, text, whole
+from drivebus.site.reading import Key, Reading, Wrong, flag, listed, number, one_of, quoted, text, whole
 
 __all__ = ["SiteAllow", "SiteShare", "SiteTcp", "share_of"]
 
@@ -64,6 +64,7 @@ class SiteTcp:
     Attributes:
         line: The line.
         address: `host:port`.
+        framing: `"tcp"`, or `"rtu"` for RTU over TCP.
         answer_within: Seconds until an answer goes out at the latest.
         dead_man: Seconds of silence after which a motor is halted, `"off"`, or None where it is not said.
         allow: What clients may do; none: all may read.
@@ -72,6 +73,7 @@ class SiteTcp:
 
     line: SiteLine
     address: str
+    framing: Literal["tcp", "rtu"] = "tcp"
     answer_within: float = 1.0
     dead_man: float | Literal["off"] | None = None
     allow: tuple[SiteAllow, ...] = ()
@@ -137,9 +139,10 @@ class _Tcp:
 
     def read(self, table: dict[str, Any], where: Key) -> SiteTcp | None:
         file = self.file
-        file.check_keys(table, ("line", "address", "answer_within", "dead_man", "allow"), where)
+        file.check_keys(table, ("line", "address", "framing", "answer_within", "dead_man", "allow"), where)
         name = file.value(where, table, "line", text, needed=len(self.lines) != 1)
         address = file.value(where, table, "address", _address, needed=True)
+        framing: Literal["tcp", "rtu"] = file.value(where, table, "framing", one_of("tcp", "rtu")) or "tcp"
         within = file.value(where, table, "answer_within", number(*_WITHIN))
         dead_man = file.value(where, table, "dead_man", _dead_man)
         line = self.lines.get(name) if name else next(iter(self.lines.values()), None)
@@ -149,7 +152,7 @@ class _Tcp:
         allow = _tables(file, table, (*where, "allow"), lambda each, there: self._allow(each, there, line))
         if line is None or address is None:
             return None
-        return SiteTcp(line, address, within or 1.0, dead_man, tuple(allow), file.line_of(where))
+        return SiteTcp(line, address, framing, within or 1.0, dead_man, tuple(allow), file.line_of(where))
 
     def _allow(self, table: dict[str, Any], where: Key, line: SiteLine | None) -> SiteAllow:
         file = self.file

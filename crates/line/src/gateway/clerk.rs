@@ -11,11 +11,11 @@ use drivebus_rtu::{Destination, ExceptionCode, Instant, Request};
 use crate::bus::Bus;
 use crate::bus::errand::Errand;
 use crate::bus::workers::Running;
+use crate::gateway::asked::Asked;
 use crate::gateway::audit::Entry;
 use crate::gateway::connection::{Connection, HURRY};
-use crate::gateway::desk::{Desk, Failed, refused};
+use crate::gateway::desk::{Desk, Failed};
 use crate::gateway::mailbox::{Answered, Found, Mail, Mailbox};
-use crate::gateway::requests::Asked;
 use crate::gateway::rights::{Judged, Means, Written, request_of};
 use crate::gateway::together::Asker;
 use crate::gateway::writing::{Record, Step, Writing, outcome_of};
@@ -50,7 +50,7 @@ impl Clerk {
     /// Asks and answers until the connection ends; why it does.
     pub(super) fn work(mut self, stream: &TcpStream, mailbox: &Arc<Mailbox>) -> String {
         let why = loop {
-            let message = match mailbox.next(self.next_due()) {
+            let message = match mailbox.next(self.next_due(), self.desk.is_free()) {
                 Found::Over(why) => break why,
                 Found::Nothing => None,
                 Found::Mail(Mail::Asked(asked, at)) => self.ask(&asked, at, mailbox),
@@ -102,16 +102,16 @@ impl Clerk {
         common.counts.asked();
         let judged = common.rights.judge(self.connection.peer.ip(), asked.unit, &asked.pdu);
         match judged {
-            Judged::Wrong(code) => return Some(refused(asked, code)),
+            Judged::Wrong(code) => return Some(self.desk.refused(asked, code)),
             Judged::Refused(why) => return Some(self.refuse(asked, &why)),
             _ => {}
         }
         let Some(bus) = common.open_bus() else {
-            return Some(refused(asked, ExceptionCode::GATEWAY_PATH_UNAVAILABLE));
+            return Some(self.desk.refused(asked, ExceptionCode::GATEWAY_PATH_UNAVAILABLE));
         };
         let Some(number) = self.desk.take(asked, at) else {
             common.counts.busy();
-            return Some(refused(asked, ExceptionCode::BUSY));
+            return Some(self.desk.refused(asked, ExceptionCode::BUSY));
         };
         match judged {
             Judged::Read(destination, request) => self.read(&bus, (asked, number), (destination, &request), mailbox),
@@ -130,7 +130,7 @@ impl Clerk {
 
     fn refuse(&self, asked: &Asked, why: &str) -> Vec<u8> {
         self.connection.common.counts.refused(self.connection.peer, why, asked);
-        refused(asked, ExceptionCode::ILLEGAL_FUNCTION)
+        self.desk.refused(asked, ExceptionCode::ILLEGAL_FUNCTION)
     }
 
     fn read(

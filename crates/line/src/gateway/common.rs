@@ -8,6 +8,7 @@ use crate::bus::Bus;
 use crate::gateway::audit::Audit;
 use crate::gateway::commanders::{Commanders, Wills};
 use crate::gateway::counts::Counts;
+use crate::gateway::framing::Framing;
 use crate::gateway::rights::Rights;
 use crate::gateway::together::Together;
 use crate::gateway::wear::Wear;
@@ -17,6 +18,7 @@ use crate::gateway::wear::Wear;
 pub(super) struct Common {
     pub(super) bus: Weak<Bus>,
     pub(super) within: Duration,
+    pub(super) framing: Framing,
     pub(super) rights: Rights,
     /// After how long a silence of who commanded motion it is halted; `None`: never.
     pub(super) dead_man: Option<Duration>,

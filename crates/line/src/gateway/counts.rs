@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::Hex;
+use crate::gateway::asked::Asked;
 use crate::gateway::audit::Outcome;
-use crate::gateway::requests::Asked;
 
 /// Words that nobody has fetched; the oldest give way.
 const KEPT: usize = 256;

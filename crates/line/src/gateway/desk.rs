@@ -6,13 +6,15 @@ use std::time::Duration;
 use drivebus_rtu::{ExceptionCode, Instant};
 
 use crate::error::{CallError, Failure};
-use crate::gateway::requests::{Asked, answer};
+use crate::gateway::asked::Asked;
+use crate::gateway::framing::Framing;
 
 /// The requests of one client on their way.
 #[derive(Debug)]
 pub(super) struct Desk {
     within: Duration,
     most: usize,
+    framing: Framing,
     numbers: u64,
     open: BTreeMap<u64, Open>,
 }
@@ -27,8 +29,13 @@ struct Open {
 
 impl Desk {
     /// One whose answers go out `within` that of the request, and which has `most` requests on their way.
-    pub(super) fn new(within: Duration, most: usize) -> Self {
-        Self { within, most, numbers: 0, open: BTreeMap::new() }
+    pub(super) const fn new(within: Duration, most: usize, framing: Framing) -> Self {
+        Self { within, most, framing, numbers: 0, open: BTreeMap::new() }
+    }
+
+    /// Whether one more may be asked now, and be told from the others by its answer.
+    pub(super) fn is_free(&self) -> bool {
+        self.framing.tells_answers_apart() || self.open.is_empty()
     }
 
     /// Takes `asked`, which came `at` that moment, and gives its number; `None`: as many are on their way as may.
@@ -47,8 +54,8 @@ impl Desk {
     pub(super) fn came(&mut self, number: u64, result: Result<&[u8], ExceptionCode>) -> Option<Vec<u8>> {
         let open = self.open.remove(&number)?;
         Some(match result {
-            Ok(pdu) => answer(open.transaction, open.unit, pdu),
-            Err(code) => refusal(open.transaction, open.unit, open.function, code),
+            Ok(pdu) => self.framing.message(open.transaction, open.unit, pdu),
+            Err(code) => self.refusal(open.transaction, open.unit, open.function, code),
         })
     }
 
@@ -63,15 +70,15 @@ impl Desk {
     pub(super) fn due(&self) -> Option<Instant> {
         self.open.values().map(|open| open.due).min()
     }
-}
 
-/// The message by which `asked` is not carried out.
-pub(super) fn refused(asked: &Asked, code: ExceptionCode) -> Vec<u8> {
-    refusal(asked.transaction, asked.unit, asked.pdu.first().copied().unwrap_or_default(), code)
-}
+    /// The message by which `asked` is not carried out.
+    pub(super) fn refused(&self, asked: &Asked, code: ExceptionCode) -> Vec<u8> {
+        self.refusal(asked.transaction, asked.unit, asked.pdu.first().copied().unwrap_or_default(), code)
+    }
 
-fn refusal(transaction: u16, unit: u8, function: u8, ExceptionCode(code): ExceptionCode) -> Vec<u8> {
-    answer(transaction, unit, &[function | 0x80, code])
+    fn refusal(&self, transaction: u16, unit: u8, function: u8, ExceptionCode(code): ExceptionCode) -> Vec<u8> {
+        self.framing.message(transaction, unit, &[function | 0x80, code])
+    }
 }
 
 /// What a client is told of a call that failed, and what is known of it.
@@ -127,7 +134,7 @@ mod tests {
 
     #[test]
     fn what_is_late_is_answered_once_and_never_again() {
-        let mut desk = Desk::new(WITHIN, 16);
+        let mut desk = Desk::new(WITHIN, 16, Framing::Tcp);
         let number = desk.take(&asked(0x1234), at(0)).unwrap();
         assert_eq!(desk.due(), Some(at(1000)));
         assert_eq!(desk.late(at(999)), []);
@@ -139,7 +146,7 @@ mod tests {
 
     #[test]
     fn more_than_may_be_on_their_way_are_not_taken() {
-        let mut desk = Desk::new(WITHIN, 2);
+        let mut desk = Desk::new(WITHIN, 2, Framing::Tcp);
         let numbers = [1, 2, 3].map(|transaction| desk.take(&asked(transaction), at(0)));
         assert_eq!(numbers.map(|number| number.is_some()), [true, true, false]);
         assert!(desk.came(numbers[0].unwrap(), Ok(&[3, 2, 0, 1])).is_some());
@@ -161,7 +168,7 @@ mod tests {
             any::<prop::sample::Index>().prop_map(Step::Answer),
             (0_u64..700).prop_map(Step::Wait),
         ], 1..60)) {
-            let mut desk = Desk::new(WITHIN, 4);
+            let mut desk = Desk::new(WITHIN, 4, Framing::Tcp);
             let (mut now, mut taken, mut answers) = (0, Vec::new(), Vec::new());
             for step in steps {
                 match step {
@@ -172,7 +179,7 @@ mod tests {
                     Step::Answer(which) if !taken.is_empty() => {
                         let (number, transaction, _) = *which.get(&taken);
                         if let Some(message) = desk.came(number, Ok(&[3, 2, 0, 1])) {
-                            prop_assert_eq!(&message, &answer(transaction, 7, &[3, 2, 0, 1]));
+                            prop_assert_eq!(&message, &Framing::Tcp.message(transaction, 7, &[3, 2, 0, 1]));
                             answers.push(number);
                         }
                     }
@@ -182,7 +189,7 @@ mod tests {
                         for (number, message) in desk.late(at(now)) {
                             let (_, transaction, asked_at) = *taken.iter().find(|one| one.0 == number).unwrap();
                             prop_assert!(now >= asked_at + 1000);
-                            prop_assert_eq!(&message, &answer(transaction, 7, &[0x83, 0x0B]));
+                            prop_assert_eq!(&message, &Framing::Tcp.message(transaction, 7, &[0x83, 0x0B]));
                             answers.push(number);
                         }
                         prop_assert!(desk.due().is_none_or(|due| due > at(now)));

@@ -5,8 +5,8 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use drivebus_rtu::Instant;
 
+use crate::gateway::asked::Asked;
 use crate::gateway::desk::Failed;
-use crate::gateway::requests::Asked;
 use crate::system::clock::monotonic;
 
 /// Requests that a reader may have read beyond those that the desk has taken: then it reads no more.
@@ -81,14 +81,16 @@ impl Mailbox {
         self.changed.notify_all();
     }
 
-    /// The next thing, by `until`. That the connection is over goes before all else.
-    pub(super) fn next(&self, until: Option<Instant>) -> Found {
+    /// The next thing, by `until`; what the client asks, only where that `may_be_asked`. That the connection is over goes
+    /// before all else.
+    pub(super) fn next(&self, until: Option<Instant>, may_be_asked: bool) -> Found {
         let mut state = self.lock();
         loop {
             if let Some(why) = &state.over {
                 return Found::Over(why.clone());
             }
-            if let Some(mail) = state.mail.pop_front() {
+            let is_next = |mail: &Mail| may_be_asked || !matches!(mail, Mail::Asked(..));
+            if let Some(mail) = state.mail.iter().position(is_next).and_then(|place| state.mail.remove(place)) {
                 state.asked -= usize::from(matches!(mail, Mail::Asked(..)));
                 self.changed.notify_all();
                 return Found::Mail(mail);

@@ -40,14 +40,14 @@ pub(super) fn serve(connection: Connection) -> std::io::Result<()> {
     let common = Arc::clone(&connection.common);
     std::thread::Builder::new().name("drivebus-tcp-in".to_owned()).spawn(move || {
         common.enter_thread();
-        let why = read(&reader, &letters);
+        let why = read(&reader, &letters, Requests::new(common.framing));
         letters.end(why);
     })?;
     let (letters, end) = (Arc::clone(&mailbox), Arc::clone(&stream));
     let desk = std::thread::Builder::new().name("drivebus-tcp".to_owned());
     let spawned = desk.spawn(move || {
         connection.common.enter_thread();
-        let desk = Desk::new(connection.common.within, IN_FLIGHT);
+        let desk = Desk::new(connection.common.within, IN_FLIGHT, connection.common.framing);
         let why = Clerk::new(connection, desk).work(&stream, &letters);
         letters.end(why);
         // The reader waits there.
@@ -61,8 +61,7 @@ pub(super) fn serve(connection: Connection) -> std::io::Result<()> {
 }
 
 /// Reads requests until the connection ends; why it does, for people, empty where the client ended it.
-fn read(stream: &TcpStream, mailbox: &Mailbox) -> String {
-    let mut requests = Requests::default();
+fn read(stream: &TcpStream, mailbox: &Mailbox, mut requests: Requests) -> String {
     let mut bytes = [0; CHUNK];
     // When what is there began: the request that is not whole, or the time without one.
     let mut since = monotonic();

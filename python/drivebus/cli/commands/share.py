@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 from time import monotonic
+from typing import Literal
 
 import click
 
@@ -25,6 +26,7 @@ _AT_ONCE = 5
 @click.command()
 @click.argument("port", required=False)
 @click.option("--tcp", "address", metavar="HOST:PORT", required=True, help="Where to listen, such as 127.0.0.1:1502.")
+@click.option("--rtu", is_flag=True, help="Clients speak RTU over TCP, instead of Modbus TCP.")
 @click.option(
     "--answer-within",
     type=Seconds(0.05, 60),
@@ -35,14 +37,20 @@ _AT_ONCE = 5
 )
 @click.option("--for", "duration", type=Seconds(0), metavar="SECONDS", help="Stop after so long.")
 @pass_session
-def share(session: Session, port: str | None, address: str, answer_within: float, duration: float | None) -> None:
+def share(
+    session: Session, port: str | None, address: str, rtu: bool, answer_within: float, duration: float | None
+) -> None:
     """Let programs that speak Modbus TCP read the line, until Ctrl-C.
 
     They read, and nothing else: whatever may write is refused. Other drivebus commands use the port meanwhile, and a
     `drivebus stop` goes before all of them. Everybody who can reach HOST:PORT can read.
     """
     session = session if port is None else replace(session, port=port)
-    with session.bus() as bus, drivebus.Gateway(bus, address, answer_within=answer_within) as gateway:
+    framing: Literal["tcp", "rtu"] = "rtu" if rtu else "tcp"
+    with (
+        session.bus() as bus,
+        drivebus.Gateway(bus, address, framing=framing, answer_within=answer_within) as gateway,
+    ):
         with suppress(KeyboardInterrupt):
             session.out.record({"address": gateway.address, "port": bus.port})
             session.out.say(gateway.address)
