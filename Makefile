@@ -216,8 +216,14 @@ matrix: $(VENV)/.dev $(VENV)/.wheel ## some minutes; see tests/python/matrix.py
 screens: $(VENV)/.dev $(VENV)/.wheel ## the screen of every command, in every window, as text in target/screens
 	DRIVEBUS_SCREENS=all $(PYTEST) -q tests/python/test_cli_screens.py
 
-conformance: $(PEERS)/.installed ## writes docs/developers/conformance.md
-	$(PEERS)/bin/python -m tests.conformance.run $(if $(ONLY),--only $(ONLY),--out docs/developers/conformance.md)
+# One section of the page alone, and how long a crowd asks each gateway: make conformance SECTION=gateways SECONDS=3600
+SECTION ?=
+SECONDS ?= 20
+
+conformance: $(PEERS)/.installed interop-parts ## writes docs/developers/conformance.md
+	@sh tools/modbus_relay.sh
+	$(PEERS)/bin/python -m tests.conformance.run --seconds $(SECONDS) \
+	    $(if $(ONLY),--only $(ONLY),--out docs/developers/conformance.md $(if $(SECTION),--section $(SECTION)))
 
 DOCS_VENV := .venv-docs
 RUSTDOC   := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)/doc

@@ -20,7 +20,7 @@ from pathlib import Path
 from drivebus.errors import DrivebusError
 from drivebus.sim import FAULT_KINDS, Simulator
 
-from .child import Child
+from .child import Child, Outcome
 from .slave import UNIT
 from .verdict import HUNG, RIGHT, WRONG, judged, pace
 
@@ -32,13 +32,18 @@ BAUD = 115_200
 ALL, UNPLUG = "all", "unplug"
 # Chance pulls out only what is in this process: here the port is unplugged by hand, before every 50th read.
 KINDS = (*(kind for kind in FAULT_KINDS if kind != UNPLUG), UNPLUG, ALL)
-LATE = 0.25  # seconds at least, twice that at most: the time-out is 0.2
+TIMEOUT = 0.2  # seconds that the libraries wait
+LATE = 0.25  # seconds at least, twice that at most
 OVERTAKEN = (0.22, 0.8)  # seconds at least and at most
 AWAY = 0.25  # seconds without the port
 PARAMETERS = range(0x2000)  # below commands and states: they stay as they are
 
 MONITOR, WORDS, TIMES = 0x3000, 10, 60  # of the row about the time between frames
 SPEEDS = (9_600, 19_200, 115_200)
+
+
+Read = Callable[[int, list[int]], Outcome]
+"""Reads as many registers as there are values, which are what it should bring."""
 
 
 @dataclass
@@ -65,12 +70,12 @@ def line(baudrate: int) -> Iterator[tuple[Simulator, Path]]:
             yield simulator, link
 
 
-def different_pairs(simulator: Simulator) -> dict[int, list[int]]:
+def different_pairs(simulator: Simulator, unit: int = UNIT) -> dict[int, list[int]]:
     """Where two of the drive's parameters stand side by side, and their values, no pair twice.
 
     All reads are of the same length, so that the answer to another question has the shape of the right one, and shows.
     """
-    drive = simulator.drive(UNIT)
+    drive = simulator.drive(unit)
     words: dict[int, int] = {}
     for address in PARAMETERS:
         with contextlib.suppress(DrivebusError):
@@ -81,24 +86,36 @@ def different_pairs(simulator: Simulator) -> dict[int, list[int]]:
 
 def spoilt(library: str, kind: str, reads: int | None = None) -> Tally:
     """One library with its defaults on a line with one kind of fault, or all of them."""
+    with line(BAUD) as (simulator, port), Child(library) as child:
+        opened = child.open(port, baudrate=BAUD, retries=None)
+        if not opened.returned:
+            return Tally(errors=Counter([f"open: {opened.error}"]))
+        return spoilt_reads(simulator, lambda address, values: child.read(address, len(values)), kind, reads)
+
+
+def spoilt_reads(
+    simulator: Simulator, read: Read, kind: str, reads: int | None = None, timeout: float = TIMEOUT
+) -> Tally:
+    """How the reads of whoever reads the line of *simulator* end, with one kind of fault on it, or all of them."""
     if reads is None:
         reads = READS_OF_ALL if kind == ALL else READS
     tally = Tally()
-    with line(BAUD) as (simulator, port), Child(library) as child:
-        pairs = list(different_pairs(simulator).items())
-        opened = child.open(port, baudrate=BAUD, retries=None)
-        if not opened.returned:
-            tally.errors[f"open: {opened.error}"] += 1
-            return tally
-        child.read(pairs[0][0], 2)
-        if kind == UNPLUG:
-            _reads(child, pairs, reads, tally, lambda number: _unplug(simulator, number, tally))
-        else:
-            simulator.line.set_times(late=LATE, overtaken=OVERTAKEN)
-            simulator.line.set_faults(**{kind: RATE})
-            _reads(child, pairs, reads, tally)
-            tally.hits = sum(simulator.line.fault_counts().values())
+    pairs = list(different_pairs(simulator).items())
+    read(*pairs[0])
+    if kind == UNPLUG:
+        _reads(read, pairs, reads, tally, lambda number: _unplug(simulator, number, tally))
+    else:
+        spoil(simulator, kind, timeout)
+        _reads(read, pairs, reads, tally)
+        tally.hits = sum(simulator.line.fault_counts().values())
     return tally
+
+
+def spoil(simulator: Simulator, kind: str, timeout: float) -> None:
+    """Puts one kind of fault on the line, or all of them. What is late is late for a *timeout* of so many seconds."""
+    longer, (low, high) = timeout / TIMEOUT, OVERTAKEN
+    simulator.line.set_times(late=LATE * longer, overtaken=(low * longer, high * longer))
+    simulator.line.set_faults(**{kind: RATE})
 
 
 def _unplug(simulator: Simulator, number: int, tally: Tally) -> None:
@@ -110,7 +127,7 @@ def _unplug(simulator: Simulator, number: int, tally: Tally) -> None:
 
 
 def _reads(
-    child: Child,
+    read: Read,
     pairs: Sequence[tuple[int, list[int]]],
     reads: int,
     tally: Tally,
@@ -122,7 +139,7 @@ def _reads(
         before(number)
         asked = time.monotonic()
         address, values = pairs[number % len(pairs)]
-        verdict = judged(child.read(address, 2), values)
+        verdict = judged(read(address, values), values)
         tally.ends[verdict.kind] += 1
         now = time.monotonic()
         if verdict.kind == RIGHT:

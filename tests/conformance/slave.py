@@ -3,7 +3,8 @@
 It answers 03H, 06H, 08H and 10H, in the order it was asked and each at most once, as a unit with one buffer does.
 What it does to a certain request is the row's business: a `Behaviour` may lose the request, change its reply, cut it
 up, put it off, or hold it back until the next request has come in, so that a late reply is late however fast or slow
-the master is. A reply that is held back until a certain register is read lets those to other requests pass.
+the master is. A reply that is held back until a certain register is read lets those to other requests pass; one that is
+held back past repeats lets those to the same request pass.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from pathlib import Path
 from . import wire
 
 UNIT = 1
-# Between a late reply or an echo and what follows: more than the silence of 3.5 characters at 9600 bit/s and above.
+# Seconds between a late reply or an echo and what follows: more than 3.5 characters at 9600 bit/s and above.
 GAP = 0.005
 
 
@@ -37,10 +38,12 @@ class Reaction:
     lost: bool = False  # the request never reached the unit; it changes nothing there
     held: bool = False  # the reply waits until the next request came, or until `release`
     until: int | None = None  # it waits for a read of this register instead, and is passed by other replies
+    past_repeats: bool = False  # it waits for a request that is not this one again
 
 
 # Given the request, how often the very same one came before, and its ordinary reply. None: nothing unusual.
 Behaviour = Callable[[wire.Request, int, bytes], Reaction | None]
+Frees = Callable[[wire.Request], bool]  # whether that request lets a held reply go
 
 
 def ordinary(_request: wire.Request, _before: int, _reply: bytes) -> Reaction | None:
@@ -71,9 +74,10 @@ class Slave:
         self.behaviour = behaviour
         self.mute = mute  # on 08H, as many devices are
         self.echo = echo  # the adapter hands back what it sends
+        self.gap = GAP
         self._registers: dict[int, int] = {}
         self._seen: Counter[wire.Request] = Counter()
-        self._held: list[tuple[int | None, bytes]] = []  # for a read of which register, or for any request
+        self._held: list[tuple[Frees, bytes]] = []
         self._outbox: deque[tuple[float, bytes]] = deque()
         self._free = 0.0  # when the line is free for the next reply
         self._lock = threading.Lock()
@@ -122,14 +126,14 @@ class Slave:
     def hold_stale(self, address: int) -> None:
         """Owes the reply to a read of *address* that came earlier: it goes out when the next request is in."""
         with self._lock:
-            self._held.append((None, wire.read_reply(UNIT, [address])))
+            self._held.append((lambda _: True, wire.read_reply(UNIT, [address])))
 
     def release(self) -> None:
         """Sends what was held back, and returns when the port has it (or a reader was quicker)."""
         with self._lock:
             size = sum(len(reply) for _, reply in self._held)
             ends = self._ends
-            self._send_held(lambda _: True)
+            self._send_held(None)
         deadline = time.monotonic() + 0.05
         while ends and _queued(ends[1]) < size and time.monotonic() < deadline:
             time.sleep(0.001)
@@ -141,12 +145,16 @@ class Slave:
         with self._lock:
             return
 
-    def _send_held(self, is_free: Callable[[int | None], bool]) -> None:
-        for until, reply in self._held:
-            if is_free(until):
-                self._free = max(time.monotonic(), self._free) + GAP
+    def _send_held(self, request: wire.Request | None) -> None:
+        """Sends those that *request* frees; without one, all."""
+        stays = []
+        for frees, reply in self._held:
+            if request is None or frees(request):
+                self._free = max(time.monotonic(), self._free) + self.gap
                 self._write(reply)
-        self._held = [(until, reply) for until, reply in self._held if not is_free(until)]
+            else:
+                stays.append((frees, reply))
+        self._held = stays
 
     def _write(self, data: bytes) -> None:
         if self._ends:
@@ -190,14 +198,14 @@ class Slave:
     def _take(self, request: wire.Request) -> None:
         before = self._seen[request]
         self._seen[request] += 1
-        self._send_held(lambda until: until is None or request.is_read(until))
+        self._send_held(request)
         if request.unit not in (0, UNIT):
             return
         reply = self._reply(request)
         reaction = self.behaviour(request, before, reply)
         if self.echo:
             self._write(wire.frame(request.unit, request.pdu))
-            self._free = time.monotonic() + GAP
+            self._free = time.monotonic() + self.gap
         if reaction and reaction.lost:
             return
         self._apply(request)
@@ -206,7 +214,7 @@ class Slave:
         if reaction is None:
             reaction = Reaction([(0.0, b"" if self.mute and request.function == wire.LOOP_BACK else reply)])
         if reaction.held:
-            self._held += [(reaction.until, data) for _, data in reaction.pieces]
+            self._held += [(_frees(reaction, request), data) for _, data in reaction.pieces]
             return
         due = max(time.monotonic(), self._free)
         for delay, data in reaction.pieces:
@@ -234,6 +242,14 @@ class Slave:
             for offset, value in enumerate(request.values):
                 self._registers[request.address + offset] = value
                 self.log.writes.append((request.unit, request.address + offset, value))
+
+
+def _frees(reaction: Reaction, held: wire.Request) -> Frees:
+    """What lets the reply to *held* go."""
+    if reaction.until is not None:
+        until = reaction.until
+        return lambda request: request.is_read(until)
+    return (lambda request: request != held) if reaction.past_repeats else (lambda _: True)
 
 
 def _queued(descriptor: int) -> int:

@@ -1,0 +1,95 @@
+"""Twenty clients at once, of five makes, before a line of four families of simulated drives.
+
+What is true is what each simulated drive says of its own parameters, which nobody changes.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from drivebus.sim import Simulator
+
+from .. import faults
+from ..child import ROOT
+from . import crowd_clients
+from .crowd_clients import Question
+from .programs import HOST, TIMEOUT, Gateway
+
+FAMILIES = {1: "gd350", 2: "vfd500", 3: "gd20", 4: "gd200a"}
+CROWD = {"strict": 5, "pymodbus": 5, "pymodbus, asyncio": 4, "libmodbus": 4, "mbpoll": 2}
+SECONDS = 20.0
+QUIET, HOSTILE = "nothing disturbs it", "2 % of every fault"
+LINES = (QUIET, HOSTILE)
+MARGIN = 90.0  # seconds that the processes may take beyond what they were told
+
+Ends = dict[str, Counter[str]]
+"""How the reads of each make ended."""
+
+
+def questions(simulator: Simulator) -> list[Question]:
+    """Pairs of parameters side by side; no two of them, of whatever unit, hold the same words."""
+    every = [
+        Question(unit, address, words)
+        for unit in FAMILIES
+        for address, words in faults.different_pairs(simulator, unit).items()
+    ]
+    often = Counter(tuple(each.words) for each in every)
+    return [each for each in every if often[tuple(each.words)] == 1]
+
+
+def crowd() -> dict[str, int]:
+    """How many clients there are of each make; where one is not on this machine, strict ones take their place."""
+    there = crowd_clients.here()
+    clients = {make: count for make, count in CROWD.items() if make in there}
+    clients["strict"] += sum(CROWD.values()) - sum(clients.values())
+    return clients
+
+
+def run(gateway: Gateway, line: str, seconds: float = SECONDS) -> Ends:
+    """All of them before one gateway, for so long."""
+    with tempfile.TemporaryDirectory() as folder:
+        port = Path(folder) / "port"
+        with Simulator(FAMILIES, baudrate=faults.BAUD, parity="N", seed=faults.SEED, link=str(port)) as simulator:
+            asked = questions(simulator)
+            with gateway.before(port, faults.BAUD) as address:
+                if line == HOSTILE:
+                    faults.spoil(simulator, faults.ALL, TIMEOUT)
+                return _all_at_once(address, seconds, asked)
+
+
+def _all_at_once(address: str, seconds: float, asked: Sequence[Question]) -> Ends:
+    host, _, port = address.rpartition(":")
+    # The makes that can say so come from an address each, as from machines of their own.
+    sources = iter(f"127.0.0.{number}" for number in range(2, 250))
+    running = {}
+    for make, count in crowd().items():
+        order = {
+            "host": host,
+            "port": int(port),
+            "seconds": seconds,
+            "sources": [HOST if make in ("libmodbus", "mbpoll") else next(sources) for _ in range(count)],
+            "questions": asked,
+            "seed": faults.SEED,
+        }
+        words = [sys.executable, "-m", f"{__package__}.crowd_clients", make]
+        process = subprocess.Popen(
+            words, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        assert process.stdin is not None
+        process.stdin.write(json.dumps(order))
+        process.stdin.close()
+        process.stdin = None
+        running[make] = process
+    ends = {}
+    for make, process in running.items():
+        said, complained = process.communicate(timeout=seconds + MARGIN)
+        if not said:
+            raise RuntimeError(f"{make}: {complained}")
+        ends[make] = Counter(json.loads(said))
+    return ends

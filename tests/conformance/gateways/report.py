@@ -1,0 +1,105 @@
+"""What was measured of gateways, as a section of the page, which can be put in the place of the one that is there."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Sequence
+
+from .. import faults
+from ..report import machine, table
+from .crowd import FAMILIES, LINES, crowd
+from .measure import Column
+from .programs import TIMEOUT
+from .rows import APART, PATIENCE, ROWS, ends
+from .strict import Tally
+
+HEADING = "## Gateways: Modbus TCP before a line"
+NOT_HERE = "not to be had"
+
+
+def section(columns: Sequence[Column], seconds: float) -> str:
+    """The whole section."""
+    titles = [column.title for column in columns]
+    rows = [[row.name, row.must, *(_cell(column, row.key) for column in columns)] for row in ROWS]
+    spoilt = [[f"`{kind}`", *(_cell(column, kind) for column in columns)] for kind in faults.KINDS]
+    makes = {make: f"{make}, {count}" for make, count in crowd().items()}
+    crowds = []
+    for line in LINES:
+        for make, name in makes.items():
+            crowds.append([line, name, *(_crowd(column, line, [make]) for column in columns)])
+        crowds.append([line, "all", *(_crowd(column, line, list(makes)) for column in columns)])
+    today = datetime.datetime.now(tz=datetime.timezone.utc).date()
+    parts = [
+        HEADING,
+        INTRODUCTION.format(date=today, machine=machine(), timeout=TIMEOUT * 1e3),
+        table(["gateway", "version", "how it is used"], [_about(column) for column in columns]),
+        LATE.format(patience=PATIENCE * 1e3, apart=APART * 1e3),
+        table(["what happens", "true end", *titles], rows),
+        FAULTS.format(reads=faults.READS, all=faults.READS_OF_ALL, streak=faults.GIVEN_UP),
+        table(["fault, 2 %", *titles], spoilt),
+        CROWD.format(families=", ".join(FAMILIES.values()), seconds=seconds),
+        table(["what disturbs the line", "clients", *titles], crowds),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def replaced(page: str, section: str) -> str:
+    """*page* with *section* in the place of the one that has its heading; at its end where there is none."""
+    heading = section.partition("\n")[0]
+    before, found, rest = page.partition(f"{heading}\n")
+    if not found:
+        return f"{page.rstrip()}\n\n{section}"
+    _, next_heading, after = rest.partition("\n## ")
+    return f"{before}{section}{next_heading}{after}"
+
+
+def _about(column: Column) -> list[str]:
+    return [column.title, column.version or NOT_HERE, column.missing or column.gateway.settings]
+
+
+def _cell(column: Column, key: str) -> str:
+    return NOT_HERE if column.missing else column.cells.get(key, "-")
+
+
+def _crowd(column: Column, line: str, makes: Sequence[str]) -> str:
+    if column.missing or line not in column.crowds:
+        return NOT_HERE if column.missing else "-"
+    return ends(sum((Tally(column.crowds[line][make]) for make in makes), Tally()))
+
+
+INTRODUCTION = """\
+Programs that let clients of Modbus TCP use a serial line, one after the other before the same line.
+`make conformance SECTION=gateways` measures and writes this section alone, `make conformance ONLY=gateways` prints it,
+`ONLY=gateways-late` one row of it.
+
+Measured {date} on {machine}.
+
+The unit is the slave of [One exchange, or a few](#one-exchange-or-a-few), 19200 bit/s, 8N1. Each gateway waits for
+{timeout:.0f} ms for an answer of the line, as drivebus does; everything else is its default. mbusd is not among them:
+Debian does not have it. Clients of [drivebus's gateway](../reference/sharing.md#modbus-tcp) may only read."""
+
+LATE = """\
+The clients are plain sockets that share no code with any gateway, and know what each register holds. They ask again and
+again on one connection, each time another register. Where a client's time-out is over, it goes on with its next
+transaction; it is {patience:.0f} ms with two clients, 10 s elsewhere.
+
+- **right**: the answer names the transaction, the unit and the function, and has the values of that question.
+- **wrong**: it names the transaction of another question, or has other values or another count; or it is a second
+  answer to one transaction, whatever it says.
+- **error**: an exception, or the gateway hung up.
+- **none**: no answer in time. One that comes later counts as nothing, unless it is wrong.
+
+Cells are right / wrong / error / none, or what became of the writes, by the unit's own log. A late answer comes
+{apart:.0f} ms before the answer to what is asked then."""
+
+FAULTS = """\
+The faults of [the simulator](#the-simulators-faults), through each gateway: {reads} reads of two registers by one client
+in each row, {all} in the last, at 115200 bit/s. A `late` answer comes 625 to 1250 ms after it was due, an `overtaken` one
+550 to 2000 ms. Cells are right / wrong / error / hung, which is no answer in 5 s. "Stopped": {streak} reads in a row were
+not right, or one hung, and no more were asked."""
+
+CROWD = """\
+Twenty clients at once for {seconds:.0f} s before four simulated drives ({families}) at 115200 bit/s:
+clients as above, and others that people use, each with a time-out of 5 s. They read two registers at a time, from all
+units in a random order; no two questions have the same answer. libmodbus and mbpoll come from one address, the others
+from an address each. Cells are right / wrong / error / none."""
