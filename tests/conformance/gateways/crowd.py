@@ -21,7 +21,7 @@ from . import crowd_clients
 from .crowd_clients import Question
 from .programs import HOST, TIMEOUT, Gateway
 
-FAMILIES = {1: "gd350", 2: "vfd500", 3: "gd20", 4: "gd200a"}
+FAMILIES = {1: "gd350", 2: "vfd500", 3: "gd20", 4: "gd600"}
 CROWD = {"strict": 5, "pymodbus": 5, "pymodbus, asyncio": 4, "libmodbus": 4, "mbpoll": 2}
 SECONDS = 20.0
 QUIET, HOSTILE = "nothing disturbs it", "2 % of every fault"
@@ -33,14 +33,18 @@ Ends = dict[str, Counter[str]]
 
 
 def questions(simulator: Simulator) -> list[Question]:
-    """Pairs of parameters side by side; no two of them, of whatever unit, hold the same words."""
-    every = [
-        Question(unit, address, words)
-        for unit in FAMILIES
-        for address, words in faults.different_pairs(simulator, unit).items()
-    ]
-    often = Counter(tuple(each.words) for each in every)
-    return [each for each in every if often[tuple(each.words)] == 1]
+    """Pairs of parameters side by side. What two units hold is asked of one: no two questions have the same answer."""
+    holders: dict[tuple[int, ...], list[Question]] = {}
+    for unit in FAMILIES:
+        for address, words in faults.different_pairs(simulator, unit).items():
+            holders.setdefault(tuple(words), []).append(Question(unit, address, words))
+    asked: list[Question] = []
+    of_unit: Counter[int] = Counter()
+    for same in sorted(holders.values(), key=len):
+        chosen = min(same, key=lambda question: of_unit[question.unit])
+        of_unit[chosen.unit] += 1
+        asked.append(chosen)
+    return asked
 
 
 def crowd() -> dict[str, int]:

@@ -163,8 +163,7 @@ connection:
 def _start_relay(port: Path, address: str, baudrate: int, folder: Path) -> Sequence[str]:
     host, _, number = address.rpartition(":")
     file = folder / "settings.yaml"
-    # It takes the real name of a port only, not a link.
-    values = {"port": port.resolve(), "host": host, "number": number, "baudrate": baudrate}
+    values = {"port": port, "host": host, "number": number, "baudrate": baudrate}
     file.write_text(RELAY_SETTINGS.format(milliseconds=round(TIMEOUT * 1e3), **values), encoding="utf-8")
     return [*_relay(), "--config", str(file)]
 
@@ -207,8 +206,8 @@ GATEWAYS: Sequence[Gateway] = (
     ),
     Gateway(
         "pymodbus",
-        "`ModbusTcpServer` before `AsyncModbusSerialClient` (`tests/conformance/gateways/forwarder.py`); every request is "
-        "repeated three times",
+        "`ModbusTcpServer` before `AsyncModbusSerialClient`, as in `tests/conformance/gateways/forwarder.py`; it "
+        "repeats every request three times",
         _installed("pymodbus", "pymodbus"),
         _start_forwarder,
     ),

@@ -93,10 +93,10 @@ Cells are right / wrong / error / none, or what became of the writes, by the uni
 {apart:.0f} ms before the answer to what is asked then."""
 
 FAULTS = """\
-The faults of [the simulator](#the-simulators-faults), through each gateway: {reads} reads of two registers by one client
-in each row, {all} in the last, at 115200 bit/s. A `late` answer comes 625 to 1250 ms after it was due, an `overtaken` one
-550 to 2000 ms. Cells are right / wrong / error / hung, which is no answer in 5 s. "Stopped": {streak} reads in a row were
-not right, or one hung, and no more were asked."""
+The faults of [the simulator](#the-simulators-faults), through each gateway: {reads} reads of two registers by one
+client in each row, {all} in the last, at 115200 bit/s. A `late` answer comes 625 to 1250 ms after it was due, an
+`overtaken` one 550 to 2000 ms. Cells are right / wrong / error / hung, which is no answer in 5 s. "Stopped": {streak}
+reads in a row were not right, or one hung, and no more were asked."""
 
 CROWD = """\
 Twenty clients at once for {seconds:.0f} s before four simulated drives ({families}) at 115200 bit/s:
