@@ -39,7 +39,7 @@ help: ## what can be made
 	@echo "make docs    the documentation as a site with a search, in target/site"
 	@echo "make try-docs   that site in a real browser: wide and narrow, and searched"
 	@echo "make bench   the benchmarks; writes benches/RESULTS.md"
-	@echo "make conformance   other masters on the same hostile line; writes docs/developers/conformance.md"
+	@echo "make conformance   other masters and gateways on the same hostile line; writes docs/developers/conformance.md"
 	@echo "make fuzz    arbitrary bytes against every layer: make fuzz TIME=600 TARGET=master"
 	@echo "make model   every state of the protocol core on every assumed line; each rule broken once"
 	@echo "make schedules   each wake-up at a bus left out once, which the search of orders of threads must notice"
@@ -216,13 +216,13 @@ matrix: $(VENV)/.dev $(VENV)/.wheel ## some minutes; see tests/python/matrix.py
 screens: $(VENV)/.dev $(VENV)/.wheel ## the screen of every command, in every window, as text in target/screens
 	DRIVEBUS_SCREENS=all $(PYTEST) -q tests/python/test_cli_screens.py
 
-# One section of the page alone, and how long a crowd asks each gateway: make conformance SECTION=gateways SECONDS=3600
+# One section of the page alone, and for how many seconds a crowd asks each gateway: make conformance SECTION=gateways CROWD=3600
 SECTION ?=
-SECONDS ?= 20
+CROWD   ?= 20
 
 conformance: $(PEERS)/.installed interop-parts ## writes docs/developers/conformance.md
 	@sh tools/modbus_relay.sh
-	$(PEERS)/bin/python -m tests.conformance.run --seconds $(SECONDS) \
+	$(PEERS)/bin/python -m tests.conformance.run --seconds $(CROWD) \
 	    $(if $(ONLY),--only $(ONLY),--out docs/developers/conformance.md $(if $(SECTION),--section $(SECTION)))
 
 DOCS_VENV := .venv-docs

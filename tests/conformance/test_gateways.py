@@ -15,7 +15,7 @@ if os.name == "nt":
 
 from . import wire
 from .gateways import crowd
-from .gateways.measure import spoilt
+from .gateways.measure import names, spoilt
 from .gateways.programs import OURS
 from .gateways.report import replaced
 from .gateways.rows import ROWS, Row, played
@@ -110,3 +110,7 @@ def test_a_section_takes_the_place_of_its_own_and_of_nothing_else() -> None:
     assert replaced(page, "## Two\n\nnew\n") == "# Page\n\n## One\n\n1\n\n## Two\n\nnew\n\n## Three\n\n3\n"
     assert replaced(page, "## Three\n\nnew\n") == "# Page\n\n## One\n\n1\n\n## Two\n\n2\n\n## Three\n\nnew\n"
     assert replaced(page, "## Four\n\n4\n") == page + "\n## Four\n\n4\n"
+
+
+def test_each_row_has_a_name_of_its_own() -> None:
+    assert len(set(names())) == len(names())

@@ -71,17 +71,27 @@ def run(say: Say, beginnings: Sequence[str] = ("",), seconds: float = crowd.SECO
     if f"{NAME}-{CROWD}" in chosen:
         for line in crowd.LINES:
             for column in here:
-                found = column.crowds[line] = crowd.run(column.gateway, line, seconds)
-                total = sum((Tally(each) for each in found.values()), Tally())
-                say(column, f"{NAME}-{CROWD}: {line}", ends(total), total.ends[WRONG] > 0)
+                _crowd(column, line, say, seconds)
     return made
+
+
+def _crowd(column: Column, line: str, say: Say, seconds: float) -> None:
+    what = f"{NAME}-{CROWD}: {line}"
+    try:
+        found = crowd.run(column.gateway, line, seconds)
+    except (DidNotStart, OSError) as reason:
+        say(column, what, f"did not serve: {reason}", True)
+        return
+    column.crowds[line] = found
+    total = sum((Tally(each) for each in found.values()), Tally())
+    say(column, what, ends(total), total.ends[WRONG] > 0)
 
 
 def _cell(column: Column, key: str, say: Say, play: Callable[[Gateway], Cell]) -> None:
     try:
         cell = play(column.gateway)
-    except DidNotStart as reason:
-        cell = Cell(f"did not start: {reason}", wrong=1)
+    except (DidNotStart, OSError) as reason:
+        cell = Cell(f"did not serve: {reason}", wrong=1)
     column.cells[key] = cell.text
     told = f"; {dict(cell.tally.details)}" if cell.tally and cell.tally.details else ""
     say(column, f"{NAME}-{key}", cell.text + told, cell.wrong > 0)

@@ -70,13 +70,13 @@ def _crowd(column: Column, line: str, makes: Sequence[str]) -> str:
 INTRODUCTION = """\
 Programs that let clients of Modbus TCP use a serial line, one after the other before the same line.
 `make conformance SECTION=gateways` measures and writes this section alone, `make conformance ONLY=gateways` prints it,
-`ONLY=gateways-late` one row of it.
+`ONLY=gateways-stalled` one row of it.
 
 Measured {date} on {machine}.
 
 The unit is the slave of [One exchange, or a few](#one-exchange-or-a-few), 19200 bit/s, 8N1. Each gateway waits for
 {timeout:.0f} ms for an answer of the line, as drivebus does; everything else is its default. mbusd is not among them:
-Debian does not have it. Clients of [drivebus's gateway](../reference/sharing.md#modbus-tcp) may only read."""
+Debian does not have it. docs/reference/sharing.md says what drivebus answers; its clients may only read."""
 
 LATE = """\
 The clients are plain sockets that share no code with any gateway, and know what each register holds. They ask again and

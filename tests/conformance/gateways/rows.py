@@ -239,7 +239,7 @@ def _is_asked(slave: Slave, register: int) -> None:
 
 
 def long_reads(_: Slave, address: str, times: int) -> Cell:
-    """One client reads as much as it can at once."""
+    """One client reads 16 registers at a time."""
     with Client(address, LONG) as client:
         for turn in range(times):
             client.read(FIRST + turn, 16)
@@ -248,42 +248,31 @@ def long_reads(_: Slave, address: str, times: int) -> Cell:
 
 RIGHT_ONES = "all right"
 NOT_WRONG = "none wrong"
+HALF_RIGHT = "half right, none wrong"
+
+NAMES = {
+    "late-answers": "one answer in ten comes when another register is asked, before the answer to that",
+    "silent-then-late": "the unit is silent on a client through all tries, and answers when the other client asks",
+    "in-place": "one answer in ten comes in place of the answer to the next register",
+    "lumps": "one answer in ten of 37 bytes comes in pieces of 4, 16 ms apart",
+    "stalled": "the same, 300 ms apart",
+    "lost-confirmation": "a write (06H) is carried out and its answer is lost: it is carried out",
+    "hung-up": "a write waits while another client has the line, and its client hangs up",
+    "idle": "4 clients say nothing, and 4 have sent half a header: reads of another one",
+}
+
+
+def _row(key: str, must: str, times: int, play: Play, behaviour: Callable[[], Behaviour] = lambda: ordinary) -> Row:
+    return Row(key, NAMES[key], must, times, play, behaviour)
+
 
 ROWS: Sequence[Row] = (
-    Row(
-        *("late", "one answer in ten comes when the next register is asked, before the answer to that", NOT_WRONG),
-        *(200, two_clients, late),
-    ),
-    Row(
-        *(
-            "silent",
-            "the unit is silent on one client through all tries, and says it when the other asks",
-            "100 / 0 / 100 / 0",
-        ),
-        *(100, one_after_the_other, silent_then_late),
-    ),
-    Row(
-        *("in place", "one answer in ten comes in place of the answer to the next register", NOT_WRONG),
-        *(200, two_clients, in_place),
-    ),
-    Row(
-        *("lumps", "one answer in ten of 37 bytes comes in pieces of 4, 16 ms apart", RIGHT_ONES),
-        *(100, long_reads, stalled(0.016)),
-    ),
-    Row(
-        *("stalled", "the same, 300 ms apart", NOT_WRONG),
-        *(100, long_reads, stalled(0.3)),
-    ),
-    Row(
-        *("lost confirmation", "a write (06H) is carried out and its answer is lost: it is carried out", "once"),
-        *(20, writes, lost_confirmations),
-    ),
-    Row(
-        *("hung up", "a write waits while another client has the line, and its client hangs up", "not sent"),
-        *(100, hangs_up, slow_reads),
-    ),
-    Row(
-        *("idle", "4 clients say nothing, and 4 have sent half a header: reads of another one", RIGHT_ONES),
-        *(50, beside_idle_ones),
-    ),
+    _row("late-answers", NOT_WRONG, 200, two_clients, late),
+    _row("silent-then-late", HALF_RIGHT, 100, one_after_the_other, silent_then_late),
+    _row("in-place", NOT_WRONG, 200, two_clients, in_place),
+    _row("lumps", RIGHT_ONES, 100, long_reads, stalled(0.016)),
+    _row("stalled", NOT_WRONG, 100, long_reads, stalled(0.3)),
+    _row("lost-confirmation", "once", 20, writes, lost_confirmations),
+    _row("hung-up", "not sent", 100, hangs_up, slow_reads),
+    _row("idle", RIGHT_ONES, 50, beside_idle_ones),
 )
