@@ -123,6 +123,11 @@ class Slave:
                 os.close(ends[1])
         os.write(self._waker, b"!")
 
+    def change(self, address: int, value: int) -> None:
+        """Changes a register by the unit's own doing."""
+        with self._lock:
+            self._registers[address] = value
+
     def hold_stale(self, address: int) -> None:
         """Owes the reply to a read of *address* that came earlier: it goes out when the next request is in."""
         with self._lock:

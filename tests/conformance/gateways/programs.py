@@ -194,7 +194,7 @@ GATEWAYS: Sequence[Gateway] = (
     Gateway(
         "modbus-relay",
         f"`modbus-relay --config FILE`, `serial_timeout` {round(TIMEOUT * 1e3)} ms, which it waits for three times; it "
-        "repeats nothing",
+        "repeats nothing; `flush_input.c` keeps its requests on a pseudo-terminal",
         _relay_version,
         _start_relay,
     ),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import socket
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -179,6 +180,32 @@ def one_after_the_other(_slave: Slave, address: str, times: int) -> Cell:
         return _cell(first.tally + second.tally)
 
 
+def old_value(slave: Slave, address: str, times: int) -> Cell:
+    """The unit is silent on a register, whose value changes then; the old one comes first when it is asked again."""
+    owed: list[bytes] = []
+    silent = threading.Event()
+
+    def behave(request: wire.Request, _before: int, reply: bytes) -> Reaction | None:
+        if not request.is_read(FIRST):
+            return None
+        if silent.is_set():
+            owed.append(reply)
+            return Reaction()
+        late = [(0.0, each) for each in owed[-1:]]
+        owed.clear()
+        return Reaction([*late, (APART, reply)])
+
+    slave.behaviour = behave
+    with Client(address, LONG) as first, Client(address, LONG) as second:
+        for turn in range(times):
+            silent.set()
+            first.read(FIRST)
+            slave.change(FIRST, FIRST + 1 + turn)
+            silent.clear()
+            second.read(FIRST, values=[FIRST + 1 + turn])
+        return _cell(second.tally)
+
+
 def writes(slave: Slave, address: str, times: int) -> Cell:
     """Writes, one after the other, each another value: how often was each carried out?"""
     with Client(address, LONG) as client:
@@ -222,7 +249,7 @@ def beside_idle_ones(_slave: Slave, address: str, times: int) -> Cell:
     for each in idle[::2]:
         each.sendall(b"\x00\x01\x00")
     time.sleep(0.1)
-    with Client(address, PATIENCE) as client:
+    with Client(address, LONG) as client:
         for turn in range(times):
             client.read(FIRST + turn)
         tally = client.tally
@@ -253,6 +280,7 @@ HALF_RIGHT = "half right, none wrong"
 NAMES = {
     "late-answers": "one answer in ten comes when another register is asked, before the answer to that",
     "silent-then-late": "the unit is silent on a client through all tries, and answers when the other client asks",
+    "old-value": "the unit is silent on a register through all tries; asked again, it says the old value, then the new",
     "in-place": "one answer in ten comes in place of the answer to the next register",
     "lumps": "one answer in ten of 37 bytes comes in pieces of 4, 16 ms apart",
     "stalled": "the same, 300 ms apart",
@@ -269,6 +297,7 @@ def _row(key: str, must: str, times: int, play: Play, behaviour: Callable[[], Be
 ROWS: Sequence[Row] = (
     _row("late-answers", NOT_WRONG, 200, two_clients, late),
     _row("silent-then-late", HALF_RIGHT, 100, one_after_the_other, silent_then_late),
+    _row("old-value", NOT_WRONG, 50, old_value),
     _row("in-place", NOT_WRONG, 200, two_clients, in_place),
     _row("lumps", RIGHT_ONES, 100, long_reads, stalled(0.016)),
     _row("stalled", NOT_WRONG, 100, long_reads, stalled(0.3)),
