@@ -10,7 +10,7 @@ from ..report import machine, table
 from .crowd import FAMILIES, LINES, crowd
 from .measure import Column
 from .programs import TIMEOUT
-from .rows import APART, PATIENCE, ROWS, ends
+from .rows import APART, PATIENCE, PAUSE, ROWS, ends
 from .strict import Tally
 
 HEADING = "## Gateways: Modbus TCP before a line"
@@ -33,7 +33,7 @@ def section(columns: Sequence[Column], seconds: float) -> str:
         HEADING,
         INTRODUCTION.format(date=today, machine=machine(), timeout=TIMEOUT * 1e3),
         table(["gateway", "version", "how it is used"], [_about(column) for column in columns]),
-        LATE.format(patience=PATIENCE * 1e3, apart=APART * 1e3),
+        LATE.format(patience=PATIENCE * 1e3, apart=APART * 1e3, pause=PAUSE * 1e3),
         table(["what happens", "true end", *titles], rows),
         FAULTS.format(reads=faults.READS, all=faults.READS_OF_ALL, streak=faults.GIVEN_UP),
         table(["fault, 2 %", *titles], spoilt),
@@ -90,7 +90,9 @@ transaction; it is {patience:.0f} ms with two clients, 10 s elsewhere.
 - **none**: no answer in time. One that comes later counts as nothing, unless it is wrong.
 
 Cells are right / wrong / error / none, or what became of the writes, by the unit's own log. A late answer comes
-{apart:.0f} ms before the answer to what is asked then."""
+{apart:.0f} ms before the answer to what is asked then. In the rows about a silent unit {pause:.0f} ms pass between two
+turns, so that each stands alone; in the first row two clients ask without a pause, and what is late for one gateway
+once may shift all that follows."""
 
 FAULTS = """\
 The faults of [the simulator](#the-simulators-faults), through each gateway: {reads} reads of two registers by one

@@ -26,6 +26,8 @@ PATIENCE = 0.8
 """Seconds until a client goes on: more than the line's time-out, less than some gateways need for all their tries."""
 LONG = 10.0
 """Seconds of a client that waits for whatever its gateway does."""
+PAUSE = 0.1
+"""Seconds between two turns of a row in which each turn stands alone: what was late in one is over by then."""
 ONE_IN = 10
 APART = 0.03  # seconds between a late answer and the next one: no gateway takes both for one frame
 FIRST, SECOND, WRITTEN = 100, 5000, 20_000
@@ -176,6 +178,7 @@ def one_after_the_other(_slave: Slave, address: str, times: int) -> Cell:
         for turn in range(times):
             first.read(FIRST + turn)
             second.read(SECOND + turn)
+            time.sleep(PAUSE)
         first.listen(PATIENCE)
         return _cell(first.tally + second.tally)
 
@@ -203,6 +206,7 @@ def old_value(slave: Slave, address: str, times: int) -> Cell:
             slave.change(FIRST, FIRST + 1 + turn)
             silent.clear()
             second.read(FIRST, values=[FIRST + 1 + turn])
+            time.sleep(PAUSE)
         return _cell(second.tally)
 
 
