@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
 import struct
@@ -15,9 +16,9 @@ if os.name == "nt":
 
 from . import wire
 from .gateways import crowd
-from .gateways.measure import names, spoilt
-from .gateways.programs import OURS
-from .gateways.report import replaced
+from .gateways.measure import Column, names, spoilt
+from .gateways.programs import GATEWAYS, OURS
+from .gateways.report import NOT_HERE, replaced, section
 from .gateways.rows import ROWS, Row, played
 from .gateways.strict import NONE, Client, End
 from .verdict import ERROR, RIGHT, WRONG
@@ -36,7 +37,7 @@ def asked(answer: Answer, questions: int = 1) -> list[End]:
 
         def serve() -> None:
             line, _ = server.accept()
-            with line:
+            with line, contextlib.suppress(OSError):  # the client may be gone
                 while len(came := line.recv(12, socket.MSG_WAITALL)) == 12:
                     transaction, _, _, unit = struct.unpack(">HHHB", came[:7])
                     line.sendall(answer(transaction, unit, came[7:]))
@@ -114,3 +115,10 @@ def test_a_section_takes_the_place_of_its_own_and_of_nothing_else() -> None:
 
 def test_each_row_has_a_name_of_its_own() -> None:
     assert len(set(names())) == len(names())
+
+
+def test_a_gateway_that_is_not_here_is_a_column_that_says_so() -> None:
+    text = section([Column(OURS, version="1.2.3"), Column(GATEWAYS[1], missing="nobody built it")], 20.0)
+    assert f"| {GATEWAYS[1].title} | {NOT_HERE} | nobody built it |" in text
+    for row in ROWS:
+        assert f"| {row.name} | {row.must} | - | {NOT_HERE} |" in text
