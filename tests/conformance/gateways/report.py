@@ -75,8 +75,8 @@ Programs that let clients of Modbus TCP use a serial line, one after the other b
 Measured {date} on {machine}.
 
 The unit is the slave of [One exchange, or a few](#one-exchange-or-a-few), 19200 bit/s, 8N1. Each gateway waits for
-{timeout:.0f} ms for an answer of the line, as drivebus does; everything else is its default. mbusd is not among them:
-Debian does not have it. docs/reference/sharing.md says what drivebus answers; its clients may only read."""
+{timeout:.0f} ms for an answer of the line, as drivebus does; everything else is its default. drivebus answers as
+docs/reference/sharing.md says, and its clients may only read. mbusd is not among them: Debian does not have it."""
 
 LATE = """\
 The clients are plain sockets that share no code with any gateway, and know what each register holds. They ask again and
@@ -97,8 +97,8 @@ once may shift all that follows."""
 FAULTS = """\
 The faults of [the simulator](#the-simulators-faults), through each gateway: {reads} reads of two registers by one
 client in each row, {all} in the last, at 115200 bit/s. A `late` answer comes 625 to 1250 ms after it was due, an
-`overtaken` one 550 to 2000 ms. Cells are right / wrong / error / hung, which is no answer in 5 s. "Stopped": {streak}
-reads in a row were not right, or one hung, and no more were asked."""
+`overtaken` one 550 to 2000 ms; modbus-relay waits for 1500 ms. Cells are right / wrong / error / hung, which is no
+answer in 5 s. "Stopped": {streak} reads in a row were not right, or one hung, and no more were asked."""
 
 CROWD = """\
 Twenty clients at once for {seconds:.0f} s before four simulated drives ({families}) at 115200 bit/s:
