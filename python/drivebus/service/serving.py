@@ -135,7 +135,9 @@ class _Served:
     def _begin(self, stack: ExitStack) -> None:
         line = self._line
         share = self._site.share
-        options: dict[str, Any] = {"reserved": line.reserved, "realtime": share.realtime, "group": share.group}
+        # So that a read is asked again within the time that its client waits.
+        options: dict[str, Any] = {"learn_timeout": True, "reserved": line.reserved, "realtime": share.realtime}
+        options["group"] = share.group
         if line.baud is not None:
             options["baudrate"] = line.baud
         if line.format is not None:

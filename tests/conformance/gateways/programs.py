@@ -24,6 +24,22 @@ SPEED = 19_200
 TIMEOUT = 0.5
 """Seconds that each gateway waits for an answer of the line: what drivebus takes, which has no option for it."""
 
+WRITTEN = list(range(20_000, 20_100))
+"""Registers that clients write."""
+
+OUR_SETTINGS = """\
+[lines.measured]
+port = "{port}"
+format = "8N1"
+baud = {baudrate}
+[[share.tcp]]
+address = "{address}"
+[[share.tcp.allow]]
+[[share.tcp.allow]]
+units = [1]
+write = {written}
+"""
+
 STARTS = 30.0  # seconds until it listens, at most
 HOST = "127.0.0.1"
 RELAY = ROOT / ".tools/modbus-relay"
@@ -74,10 +90,12 @@ class Gateway:
                 process.wait()
 
 
-def start_ours(port: Path, address: str, baudrate: int = SPEED) -> Sequence[str]:
-    """The command that starts drivebus's gateway. An option that lets clients write belongs here."""
-    line = ["--format", "8N1", "--baud", str(baudrate)]
-    return [sys.executable, "-m", "drivebus", *line, "share", str(port), "--tcp", address]
+def start_ours(port: Path, address: str, baudrate: int, folder: Path) -> Sequence[str]:
+    """The command that starts drivebus's gateway, which lets clients read, and write to some registers of unit 1."""
+    file = folder / "drivebus.toml"
+    values = {"port": port, "address": address, "baudrate": baudrate, "written": WRITTEN}
+    file.write_text(OUR_SETTINGS.format(**values), encoding="utf-8")
+    return [sys.executable, "-m", "drivebus", "--config", str(file), "serve"]
 
 
 def _listens(process: subprocess.Popen[bytes], address: str) -> None:
@@ -184,9 +202,10 @@ def _start_forwarder(port: Path, address: str, baudrate: int, _folder: Path) -> 
 
 OURS = Gateway(
     "drivebus",
-    "`drivebus share PORT --tcp HOST:PORT`; a read is repeated twice after silence; an answer goes out within 1 s",
+    "`drivebus serve` with `[[share.tcp]]`: all may read, and write to 100 registers; a read is repeated twice after "
+    "silence; an answer goes out within 1 s",
     _ours,
-    lambda port, address, baudrate, _: start_ours(port, address, baudrate),
+    start_ours,
 )
 
 GATEWAYS: Sequence[Gateway] = (

@@ -76,7 +76,7 @@ Measured {date} on {machine}.
 
 The unit is the slave of [One exchange, or a few](#one-exchange-or-a-few), 19200 bit/s, 8N1. Each gateway waits for
 {timeout:.0f} ms for an answer of the line, as drivebus does; everything else is its default. drivebus answers as
-docs/reference/sharing.md says, and its clients may only read. mbusd is not among them: Debian does not have it."""
+docs/reference/service.md says. mbusd is not among them: Debian does not have it."""
 
 LATE = """\
 The clients are plain sockets that share no code with any gateway, and know what each register holds. They ask again and

@@ -48,7 +48,8 @@ def share(
     session = session if port is None else replace(session, port=port)
     framing: Literal["tcp", "rtu"] = "rtu" if rtu else "tcp"
     with (
-        session.bus() as bus,
+        # So that a read is asked again within the time that its client waits.
+        session.bus(learn_timeout=True) as bus,
         drivebus.Gateway(bus, address, framing=framing, answer_within=answer_within) as gateway,
     ):
         with suppress(KeyboardInterrupt):
