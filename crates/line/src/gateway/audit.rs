@@ -134,6 +134,10 @@ impl Rotated {
     }
 
     fn append(&mut self, line: &str) -> io::Result<()> {
+        if self.is_put_aside() {
+            self.file = opened(&self.path)?;
+            self.size = self.file.metadata()?.len();
+        }
         if self.size >= LARGE {
             self.put_aside()?;
         }
@@ -141,6 +145,22 @@ impl Rotated {
         (&*self.file).write_all(line.as_bytes())?;
         self.size += line.len() as u64;
         Ok(())
+    }
+
+    /// Whether another file has its name by now: that of another gateway with the same audit, which put it aside.
+    #[cfg(unix)]
+    fn is_put_aside(&self) -> bool {
+        use std::os::unix::fs::MetadataExt as _;
+
+        let file = |status: &fs::Metadata| (status.dev(), status.ino());
+        let own = self.file.metadata();
+        !own.is_ok_and(|own| fs::metadata(&self.path).is_ok_and(|there| file(&own) == file(&there)))
+    }
+
+    /// Nobody asks for the number of a file there.
+    #[cfg(not(unix))]
+    const fn is_put_aside(&self) -> bool {
+        false
     }
 
     fn put_aside(&mut self) -> io::Result<()> {
@@ -316,6 +336,19 @@ mod tests {
         assert_eq!(whole.len(), 3);
         assert!(whole.iter().all(|line| serde_json::from_str::<serde_json::Value>(line).is_ok()));
         assert_eq!(now.lines().count(), 2);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn two_with_one_file_put_it_aside_once() {
+        let folder = Folder::new("two");
+        let path = folder.0.join("audit.jsonl");
+        fs::write(&path, format!("{}\n", "x".repeat(usize::try_from(LARGE).unwrap()))).unwrap();
+        let [mut one, mut other] = [(); 2].map(|()| Rotated::open(&path).unwrap());
+        one.append("one").unwrap();
+        other.append("other").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "one\nother\n");
+        assert!(!folder.0.join("audit.jsonl.2").exists());
     }
 
     #[cfg(target_os = "linux")]
