@@ -127,7 +127,7 @@ class Gateway:
         answer_within: Seconds until an answer goes out at the latest, 0.05..60.
         allow: What clients may do. Empty: all may read. Drives that answer are asked who they are.
         dead_man: Seconds, 0.1..3600: a motor is halted when the client that set it in motion has hung up, or has asked
-            nothing for so long. `"off"`: it runs on. Has to be said where clients may move a motor.
+            nothing for so long after an answer. `"off"`: it runs on. Has to be said where clients may move a motor.
         audit: The file to which each write of a client is appended: a line of JSON with the time, the client, the unit,
             the registers by name, the old and the new words, and the outcome. It is put aside at 10 MB; nine are kept.
 

@@ -222,3 +222,13 @@ def test_where_the_gateway_itself_is_killed_the_next_one_halts_the_motor(tmp_pat
             seen(lambda: simulator.drive(1).state == "stopped")
             again.kill()
         assert (0x2000, 5) in written(simulator)
+
+
+def test_who_waits_for_an_answer_is_not_silent() -> None:
+    """A drive that does not answer keeps the client waiting for longer than it may be silent."""
+    with plant(0.2) as (simulator, _, gateway), connected(gateway) as client:
+        assert ask(client, RUN) == RUN
+        simulator.line.drop_answers(3)
+        assert ask(client, LOOK) == b"\x83\x0b"
+        assert written(simulator) == [RUNS]
+        assert gateway.stats.halted == 0

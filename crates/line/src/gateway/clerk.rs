@@ -28,8 +28,8 @@ pub(super) struct Clerk {
     connection: Connection,
     desk: Desk,
     on_their_way: BTreeMap<u64, OnItsWay>,
-    /// When the client asked last.
-    heard: Instant,
+    /// Since when it is the client's turn: it asked last, or was answered last.
+    since: Instant,
 }
 
 /// A request on its way to the line.
@@ -44,7 +44,7 @@ enum OnItsWay {
 
 impl Clerk {
     pub(super) fn new(connection: Connection, desk: Desk) -> Self {
-        Self { connection, desk, on_their_way: BTreeMap::new(), heard: monotonic() }
+        Self { connection, desk, on_their_way: BTreeMap::new(), since: monotonic() }
     }
 
     /// Asks and answers until the connection ends; why it does.
@@ -64,10 +64,13 @@ impl Clerk {
                     self.take_back(&way);
                 }
             }
-            if self.silent_since().is_some_and(|due| due <= now) {
+            if self.silent_at().is_some_and(|due| due <= now) {
                 self.connection.gone("is silent");
             }
-            let mut all = message.into_iter().chain(late.into_iter().map(|(_, message)| message));
+            let mut all = message.into_iter().chain(late.into_iter().map(|(_, message)| message)).peekable();
+            if all.peek().is_some() {
+                self.since = now;
+            }
             if let Some(why) = all.find_map(|message| write(stream, &message).err()) {
                 break why;
             }
@@ -84,19 +87,19 @@ impl Clerk {
 
     /// When something is to be done though nothing comes.
     fn next_due(&self) -> Option<Instant> {
-        self.desk.due().into_iter().chain(self.silent_since()).min()
+        self.desk.due().into_iter().chain(self.silent_at()).min()
     }
 
-    /// Until when the client has to ask something, lest what it commanded is halted.
-    fn silent_since(&self) -> Option<Instant> {
+    /// Until when the client has to ask something, lest what it commanded is halted; `None` while it waits for an answer.
+    fn silent_at(&self) -> Option<Instant> {
         let common = &self.connection.common;
-        let within = common.dead_man?;
-        common.commanders.has(self.connection.place.number).then(|| self.heard + within)
+        let within = common.dead_man.filter(|_| self.desk.due().is_none())?;
+        common.commanders.has(self.connection.place.number).then(|| self.since + within)
     }
 
     /// Asks the line, or answers at once.
     fn ask(&mut self, asked: &Asked, at: Instant, mailbox: &Arc<Mailbox>) -> Option<Vec<u8>> {
-        self.heard = at;
+        self.since = at;
         self.connection.place.asks(at);
         let common = Arc::clone(&self.connection.common);
         common.counts.asked();
