@@ -64,13 +64,13 @@ impl Clerk {
                     self.take_back(&way);
                 }
             }
+            if message.is_some() || !late.is_empty() {
+                self.since = now;
+            }
             if self.silent_at().is_some_and(|due| due <= now) {
                 self.connection.gone("is silent");
             }
-            let mut all = message.into_iter().chain(late.into_iter().map(|(_, message)| message)).peekable();
-            if all.peek().is_some() {
-                self.since = now;
-            }
+            let mut all = message.into_iter().chain(late.into_iter().map(|(_, message)| message));
             if let Some(why) = all.find_map(|message| write(stream, &message).err()) {
                 break why;
             }
