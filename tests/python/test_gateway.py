@@ -78,8 +78,11 @@ def test_pymodbus_reads_what_the_bus_reads(gateway: Gateway, bus: Bus) -> None:
         assert (refused.isError(), refused.exception_code) == (True, 2)
         silent = client.read_holding_registers(0x2103, count=1, device_id=9)
         assert (silent.isError(), silent.exception_code) == (True, 0x0B)
+        [counted] = [program for program in bus.stats().programs if program["name"].startswith("client 127.0.0.1:")]
+        assert (counted["process"], counted["here"], counted["calls"], counted["answered"]) == (0, True, 4, 2)
     stats = gateway.stats
     assert (stats.requests, stats.answered, stats.failed, stats.refused) == (4, 2, 2, 0)
+    seen(lambda: not bus.stats().programs)
 
 
 def test_nothing_but_reads_gets_through(gateway: Gateway, simulator: Simulator) -> None:

@@ -231,7 +231,9 @@ def test_its_status(tmp_path: Path) -> None:
 
             seen(lambda: status()["requests"] == 1)
             assert status()["clients"] == 1
-            assert "1 client, 1 request: 1 answered" in serve(file, "--status", env=environment).stdout
+            shown = serve(file, "--status", env=environment).stdout
+            assert "1 client, 1 request: 1 answered" in shown
+            assert f"client 127.0.0.1:{client.getsockname()[1]}, 1 request, 1 answered" in shown
 
 
 @NO_PTY

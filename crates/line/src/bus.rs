@@ -283,7 +283,9 @@ impl Bus {
         if !self.port().is_of_this_process() {
             return Stats::default(); // a thread of the parent's may have held it
         }
-        self.shared.stats()
+        let mut stats = self.shared.stats();
+        stats.programs.extend(self.port().programs.clients());
+        stats
     }
 
     /// How often the port was opened again after it was lost, or was another program's and changed hands.
@@ -349,10 +351,10 @@ impl Bus {
         self.port().enter_thread();
     }
 
-    /// A number for one more program that uses the line through this one.
+    /// A number for one more client that uses the line through this program, counted under `name`.
     #[cfg(feature = "tcp")]
-    pub(crate) fn seat(&self) -> Seat {
-        self.port().programs.seat()
+    pub(crate) fn seat_of(&self, name: String) -> Seat {
+        self.port().programs.seat_of(name)
     }
 
     /// Whether frames are told apart by something else than silence.

@@ -261,15 +261,15 @@ impl Door {
 
     fn let_in(&self, stream: TcpStream, peer: SocketAddr) -> io::Result<()> {
         let Some(bus) = self.common.bus.upgrade() else { return Ok(()) };
-        let seat = bus.seat();
-        drop(bus);
         let (stream, host) = (Arc::new(Kept::new(stream)), peer.ip().to_canonical());
+        let peer = SocketAddr::new(host, peer.port());
+        let seat = bus.seat_of(format!("client {peer}"));
+        drop(bus);
         let Some((place, gave_way)) = self.clients.enter(Arc::clone(&stream), host, monotonic()) else { return Ok(()) };
         if gave_way {
             self.common.counts.gave_way(peer);
         }
         self.common.counts.let_in();
-        let peer = SocketAddr::new(host, peer.port());
         let common = Arc::clone(&self.common);
         reader::serve(Connection { common, seat, peer, name: peer.to_string(), place, stream })
     }

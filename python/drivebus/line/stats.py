@@ -119,8 +119,8 @@ class UnitStats(Named[str, Any]):
 class ProgramStats(TypedDict):
     """What one program asked of a port that it shares with others.
 
-    Keys: *name*, as it calls itself; *process*, its number in the system; *here*, whether it still uses the port;
-    *calls* that it wanted, and how many of them were *answered*.
+    Keys: *name*, as it calls itself; *process*, its number in the system, 0 of a client over the network; *here*,
+    whether it still uses the port; *calls* that it wanted, and how many of them were *answered*.
     """
 
     name: str
@@ -142,7 +142,8 @@ class Stats(UnitStats):
         wills: What was halted for programs that are gone, in words.
         hints: What the counters most likely mean, and what to do, in words.
         hint_names: The names of the hints.
-        programs: The programs that use the port through the one that has it, since that opened it.
+        programs: The programs that use the port through the one that has it, since that opened it, and the clients that
+            it serves over the network now.
         units: The counters of each unit, by its address.
     """
 

@@ -389,7 +389,9 @@ fn next(channel: &RefCell<Channel>, visit: &Visit, port: &Weak<Port>) -> Option<
             Told::Over(ended.err().as_ref().map(Said::from))
         }
         Wish::Stats => {
-            let stats = Stats { programs: visit.guests.counted(), ..port.figures.stats() };
+            let mut programs = visit.guests.counted();
+            programs.extend(port.programs.clients());
+            let stats = Stats { programs, ..port.figures.stats() };
             Told::Stats(Box::new(Figures::from(stats)))
         }
         Wish::Link(unit) => {

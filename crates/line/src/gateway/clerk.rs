@@ -103,6 +103,7 @@ impl Clerk {
         self.connection.place.asks(at);
         let common = Arc::clone(&self.connection.common);
         common.counts.asked();
+        self.connection.seat.asked();
         let judged = common.rights.judge(self.connection.peer.ip(), asked.unit, &asked.pdu);
         match judged {
             Judged::Wrong(code) => return Some(self.desk.refused(asked, code)),
@@ -318,6 +319,9 @@ impl Clerk {
     fn answer(&mut self, number: u64, result: &Answered) -> Option<Vec<u8>> {
         let message = self.desk.came(number, result.as_deref().map_err(|failed| failed.code))?;
         self.connection.common.counts.answered(result.is_ok());
+        if result.is_ok() {
+            self.connection.seat.answered();
+        }
         Some(message)
     }
 }

@@ -17,7 +17,8 @@ pub struct Stats {
     pub reconnects: u64,
     /// How often another program had changed the settings of the open port, which were set again.
     pub settings_changed: u64,
-    /// The programs that use the port through the one that has it, since that opened it.
+    /// The programs that use the port through the one that has it, since that opened it, and the clients that it serves over
+    /// the network now.
     pub programs: Vec<Program>,
 }
 
@@ -29,7 +30,7 @@ pub struct Stats {
 pub struct Program {
     /// As it calls itself, such as `drivebus`.
     pub name: String,
-    /// Its number in the system.
+    /// Its number in the system; 0 of a client over the network.
     pub process: u32,
     /// Whether it still uses the port.
     pub here: bool,

@@ -66,9 +66,12 @@ def _show(session: Session, status: dict[str, Any]) -> None:
             session.out.say(f"{name}: {line['port']} is away: {line['why']}")
             continue
         session.out.say(
-            f"{name}: {line['port']}, {counted(line['requests'], 'request')}, {line['timeouts']} without an answer, "
-            f"{counted(len(line['programs']), 'program')}"
+            f"{name}: {line['port']}, {counted(line['requests'], 'request')}, {line['timeouts']} without an answer"
         )
+        for program in line["programs"]:
+            session.out.say(
+                f"{name}: {program['name']}, {counted(program['calls'], 'request')}, {program['answered']} answered"
+            )
         for address, of in line["tcp"].items():
             session.out.say(
                 f"{name}: {address}, {counted(of['clients'], 'client')}, {counted(of['requests'], 'request')}: "
