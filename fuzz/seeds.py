@@ -388,6 +388,8 @@ def clients() -> dict[str, bytes]:
         "too-long": b"\xff" + bytes([0, 1, 0, 0, 0, 255]) + bytes(255),
         "http": b"\xff" + b"GET / HTTP/1.1\r\n\r\n",
         "tls-behind-one": b"\x0b" + asked(1, 1, read) + bytes.fromhex("16030102000100"),
+        "rtu": b"\x05" + sealed(b"\x01" + read) + sealed(b"\x02\x41\x07") + sealed(b"\x02" + write)[:-1] + b"\0",
+        "rtu-longest": b"\xff" + sealed(b"\x01\x10\0\0\0\x7b\xf6" + bytes(246)) + sealed(b"\x01" + read)[:-1],
     }
 
 

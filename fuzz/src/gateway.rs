@@ -1,10 +1,13 @@
 //! Invariant: whatever a client of Modbus TCP sends, in whatever pieces, the requests that come out are those that stand in
 //! its bytes, one behind the other, up to the first header that no request has; and after that, none ever.
 //!
-//! The oracle walks over all the bytes at once, as the guide's §3.1.3 describes a header.
+//! The oracle walks over all the bytes at once, as the guide's §3.1.3 describes a header. The same bytes as RTU over TCP: what
+//! comes out is what they begin with, each with its CRC, and less than one frame is kept.
 
-use drivebus_line::gateway::Requests;
+use drivebus_line::gateway::{Framing, Requests};
+use drivebus_rtu::MAX_ADU;
 
+use crate::oracle;
 use crate::stream::Input;
 
 /// Number, unit and PDU.
@@ -46,4 +49,18 @@ pub fn gateway(data: &[u8]) {
     let came: Vec<_> = came.iter().map(|(number, unit, pdu)| (*number, *unit, pdu.as_slice())).collect();
     assert_eq!(came, there, "requests are not those of the bytes");
     assert_eq!(ended.is_some(), is_over, "{ended:?}");
+    over_rtu(bytes, piece);
+}
+
+fn over_rtu(bytes: &[u8], piece: usize) {
+    let (mut requests, mut again, mut is_over) = (Requests::new(Framing::Rtu), Vec::new(), false);
+    for piece in bytes.chunks(piece) {
+        let outcome = requests.take(piece, |asked| {
+            again.extend(oracle::sealed(&[&[asked.unit], &asked.pdu[..]].concat()));
+        });
+        assert!(!is_over || outcome.is_err(), "a stream that has ended goes on");
+        is_over = outcome.is_err();
+    }
+    assert!(bytes.starts_with(&again), "requests are not those of the bytes");
+    assert!(is_over || bytes.len() - again.len() < MAX_ADU, "more is kept than one frame");
 }
