@@ -242,3 +242,16 @@ sys.stdin.read()
 def test_a_group_that_is_none_is_told_before_anything_is_opened(group: object) -> None:
     with pytest.raises(drivebus.BadArgument, match="is none of this system"):
         drivebus.Bus("/dev/nowhere", group=group)  # type: ignore[arg-type]
+
+
+@needs_users
+def test_a_service_goes_through_a_program_of_its_own_user_that_has_the_port(plant: Plant) -> None:
+    """A serial server does not say that it is taken: two masters would talk at once."""
+    with plant.start(
+        SERVICE, (GROUP,), "-c", SERVE.replace(", group=int(sys.argv[2])", ""), plant.simulator.port
+    ) as first:
+        assert first.stdout is not None
+        assert first.stdout.readline() == "serves\n"
+        with plant.service():
+            out, _ = first.communicate()
+    assert "python" in out

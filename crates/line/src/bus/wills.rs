@@ -97,7 +97,7 @@ struct State {
     /// Whether a will was left of which the program that has the port was not told.
     untold: bool,
     is_attended: bool,
-    /// Where wills of the port that this bus opened last are found; its own are left at the first.
+    /// Where wills of the port that this bus opened last are found.
     places: Vec<Place>,
     notes: Vec<String>,
 }
@@ -295,7 +295,7 @@ impl Wills {
     /// Where whoever has the port looks: the program through which this bus uses it, or this one.
     fn place(&self) -> Option<Place> {
         let there = self.bus.get().and_then(Weak::upgrade).and_then(|bus| bus.place());
-        there.or_else(|| self.lock().places.first().cloned())
+        there.or_else(|| self.lock().places.iter().find(|place| place.is_own(self.group)).cloned())
     }
 
     /// Leaves `last` where the one who has the port finds it. `None` where nobody could.

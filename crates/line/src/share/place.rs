@@ -85,19 +85,29 @@ pub(crate) enum Nobody {
 
 impl Place {
     /// Where the program may stand that has one of the ports which are called `names`, in one order for everybody: where this
-    /// one [would](Self::own), and beside that where a group meets.
+    /// one [would](Self::own), and beside that where one stands for its user, or for a group.
     ///
     /// # Errors
     ///
     /// As of [`own`](Self::own).
     pub(crate) fn all(names: Vec<String>, group: Option<u32>) -> io::Result<Vec<Self>> {
-        let mut places = Self::own(names.clone(), group)?;
-        if let (None, Some(folder)) = (group, of_machine()) {
-            let there =
-                in_order(names).map(|name| Self { folder: folder.clone(), name, nameless: None, is_of_group: true });
-            places.extend(there.filter(|place| fs::symlink_metadata(place.path("sock")).is_ok()));
+        let own = Self::own(names.clone(), group)?;
+        let is_there = |place: &Self| fs::symlink_metadata(place.path("sock")).is_ok();
+        if group.is_some() {
+            let of_user = Self::own(names, None).unwrap_or_default();
+            return Ok(of_user.into_iter().filter(is_there).chain(own).collect());
         }
-        Ok(places)
+        let folder = of_machine();
+        let of_group = folder.into_iter().flat_map(|folder| {
+            let place = move |name| Self { folder: folder.clone(), name, nameless: None, is_of_group: true };
+            in_order(names.clone()).map(place)
+        });
+        Ok(own.into_iter().chain(of_group.filter(is_there)).collect())
+    }
+
+    /// Whether a program that serves `group`, or its own user's alone, has its place here.
+    pub(crate) const fn is_own(&self, group: Option<u32>) -> bool {
+        self.is_of_group == group.is_some()
     }
 
     /// Where this program lets others in, which serves `group` or else its own user's programs alone.
