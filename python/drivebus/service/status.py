@@ -12,7 +12,7 @@ from typing import Any
 
 from drivebus.errors import NotAllowed
 from drivebus.line.runtime_folder import run_time_folder
-from drivebus.site import Site
+from drivebus.site import Site, state_file
 
 __all__ = ["StatusFile", "read_status"]
 
@@ -25,7 +25,7 @@ class StatusFile:
 
     def __init__(self, site: Site) -> None:
         given = os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
-        self._path = (Path(given) if given else run_time_folder()) / _name(site)
+        self._path = (Path(given) if given else _own_folder()) / _name(site)
 
     def write(self, status: Mapping[str, Any]) -> None:
         """Replaces what is there, whole."""
@@ -45,8 +45,7 @@ def read_status(site: Site) -> dict[str, Any]:
     Raises:
         NotAllowed: None runs, as far as can be seen.
     """
-    folders = [] if sys.platform == "win32" else [_MACHINE, run_time_folder()]
-    for folder in folders:
+    for folder in (_MACHINE, _own_folder()):
         try:
             status = json.loads((folder / _name(site)).read_text(encoding="utf-8"))
         except (OSError, ValueError):
@@ -54,6 +53,15 @@ def read_status(site: Site) -> dict[str, Any]:
         if isinstance(status, dict):
             return status
     raise NotAllowed(f"no service of {site.path} runs on this computer, as far as this user can see")
+
+
+def _own_folder() -> Path:
+    """The folder of this user's services, which is there."""
+    if sys.platform != "win32":
+        return run_time_folder()
+    folder = Path(state_file("serve")).parent
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def _name(site: Site) -> str:
