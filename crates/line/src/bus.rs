@@ -283,7 +283,12 @@ impl Bus {
         if !self.port().is_of_this_process() {
             return Stats::default(); // a thread of the parent's may have held it
         }
+        #[cfg_attr(
+            not(any(feature = "tcp", all(unix, feature = "share"))),
+            expect(unused_mut, reason = "nobody else is here")
+        )]
         let mut stats = self.shared.stats();
+        #[cfg(any(feature = "tcp", all(unix, feature = "share")))]
         stats.programs.extend(self.port().programs.clients());
         stats
     }

@@ -91,8 +91,41 @@ pub struct GatewayOptions {
     pub audit: Option<PathBuf>,
 }
 
+impl GatewayOptions {
+    /// Sets [`answer_within`](Self#structfield.answer_within).
+    #[must_use]
+    pub fn answer_within(self, answer_within: Duration) -> Self {
+        Self { answer_within, ..self }
+    }
+
+    /// Sets [`framing`](Self#structfield.framing).
+    #[must_use]
+    pub fn framing(self, framing: Framing) -> Self {
+        Self { framing, ..self }
+    }
+
+    /// Sets [`rights`](Self#structfield.rights).
+    #[must_use]
+    pub fn rights(self, rights: Rights) -> Self {
+        Self { rights, ..self }
+    }
+
+    /// Sets [`dead_man`](Self#structfield.dead_man).
+    #[must_use]
+    pub fn dead_man(self, dead_man: DeadMan) -> Self {
+        Self { dead_man: Some(dead_man), ..self }
+    }
+
+    /// Sets [`audit`](Self#structfield.audit).
+    #[must_use]
+    pub fn audit(self, audit: impl Into<Option<PathBuf>>) -> Self {
+        Self { audit: audit.into(), ..self }
+    }
+}
+
 /// What becomes of a motor that a client commanded which is gone, or silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum DeadMan {
     /// It is halted when the client has hung up, or has asked nothing for so long.
     After(Duration),

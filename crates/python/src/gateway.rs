@@ -26,7 +26,7 @@ fn rights(rules: Vec<GivenRule>, units: Vec<GivenHalts>) -> PyResult<Rights> {
     let rules = rules.into_iter().map(|(networks, units, functions, writes)| {
         let networks = networks.iter().map(|text| text.parse::<Network>().map_err(refuse));
         let networks = networks.collect::<PyResult<_>>()?;
-        Ok(Rule { networks, units, functions, writes: writables(writes)? })
+        Ok(Rule::new(functions).networks(networks).units(units).writes(writables(writes)?))
     });
     let mut rights = Rights::new(rules.collect::<PyResult<_>>()?);
     for (unit, stops, ways, look) in units {
@@ -35,7 +35,7 @@ fn rights(rules: Vec<GivenRule>, units: Vec<GivenHalts>) -> PyResult<Rights> {
             Some((question, others)) => will.look(question, others),
             None => will,
         };
-        rights.units.insert(unit, Halts { stops: writables(stops)?, will });
+        rights.units.insert(unit, Halts::new(writables(stops)?, will));
     }
     Ok(rights)
 }
@@ -53,7 +53,7 @@ fn writable((table, address, words, means, instead, name, shown_at): GivenWrite)
         "moves" => Means::Moves,
         _ => return Err(bad_argument(format!("{means} is nothing that a write does"))),
     };
-    Ok(Writable { table, address, words, means, name, shown_at })
+    Ok(Writable::new(table, address, name).words(words).means(means).shown_at(shown_at))
 }
 
 /// A server for Modbus TCP, until it is closed.
@@ -78,17 +78,16 @@ impl Gateway {
         dead_man: Option<f64>,
         audit: Option<PathBuf>,
     ) -> PyResult<Self> {
-        let mut options = GatewayOptions::default();
-        options.answer_within = duration("answer_within", within)?;
-        options.framing = if rtu { Framing::Rtu } else { Framing::Tcp };
-        if !rules.is_empty() {
-            options.rights = rights(rules, units)?;
-        }
-        options.dead_man = Some(match dead_man {
+        let dead_man = match dead_man {
             Some(silence) => DeadMan::After(duration("dead_man", silence)?),
             None => DeadMan::Off,
-        });
-        options.audit = audit;
+        };
+        let options = GatewayOptions::default()
+            .answer_within(duration("answer_within", within)?)
+            .framing(if rtu { Framing::Rtu } else { Framing::Tcp })
+            .dead_man(dead_man)
+            .audit(audit);
+        let options = if rules.is_empty() { options } else { options.rights(rights(rules, units)?) };
         let core = &bus.get().core;
         let opened = bus.py().detach(|| CoreGateway::open(core, address, options));
         opened.map(|core| Self { core }).map_err(|error| {

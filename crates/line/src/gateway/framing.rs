@@ -6,6 +6,7 @@ use crate::ports::mbap::message;
 
 /// What clients speak.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Framing {
     /// Modbus TCP: a header before each message, with a number that the answer brings back.
     #[default]

@@ -51,6 +51,7 @@ impl Rights {
 
 /// What some clients may do to some units.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Rule {
     /// Whose clients; none: everybody's.
     pub networks: Vec<Network>,
@@ -62,8 +63,34 @@ pub struct Rule {
     pub writes: Vec<Writable>,
 }
 
+impl Rule {
+    /// What everybody may do to the units 1 to 247 by `functions`.
+    pub fn new(functions: Vec<u8>) -> Self {
+        Self { functions, ..Self::default() }
+    }
+
+    /// Sets [`networks`](Self#structfield.networks).
+    #[must_use]
+    pub fn networks(self, networks: Vec<Network>) -> Self {
+        Self { networks, ..self }
+    }
+
+    /// Sets [`units`](Self#structfield.units).
+    #[must_use]
+    pub fn units(self, units: Vec<u8>) -> Self {
+        Self { units, ..self }
+    }
+
+    /// Sets [`writes`](Self#structfield.writes).
+    #[must_use]
+    pub fn writes(self, writes: Vec<Writable>) -> Self {
+        Self { writes, ..self }
+    }
+}
+
 /// A place that may be written, and what that does.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Writable {
     /// Coils or holding registers.
     pub table: Table,
@@ -79,8 +106,34 @@ pub struct Writable {
     pub shown_at: Option<u16>,
 }
 
+impl Writable {
+    /// Any word at `address`, which sets something.
+    pub fn new(table: Table, address: u16, name: impl Into<String>) -> Self {
+        Self { table, address, words: None, means: Means::Sets, name: name.into(), shown_at: None }
+    }
+
+    /// Sets [`words`](Self#structfield.words).
+    #[must_use]
+    pub fn words(self, words: impl Into<Option<Vec<u16>>>) -> Self {
+        Self { words: words.into(), ..self }
+    }
+
+    /// Sets [`means`](Self#structfield.means).
+    #[must_use]
+    pub fn means(self, means: Means) -> Self {
+        Self { means, ..self }
+    }
+
+    /// Sets [`shown_at`](Self#structfield.shown_at).
+    #[must_use]
+    pub fn shown_at(self, shown_at: impl Into<Option<u16>>) -> Self {
+        Self { shown_at: shown_at.into(), ..self }
+    }
+}
+
 /// What a write does, as far as that decides whether and how it goes out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Means {
     /// It sets something.
     Sets,
@@ -97,11 +150,19 @@ pub enum Means {
 
 /// How a unit is halted.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Halts {
     /// The writes by which clients do it: allowed to each who may write anything to the unit.
     pub stops: Vec<Writable>,
     /// How it is done for a client that is gone.
     pub will: LastWill,
+}
+
+impl Halts {
+    /// By `stops`, and for a client that is gone by `will`.
+    pub const fn new(stops: Vec<Writable>, will: LastWill) -> Self {
+        Self { stops, will }
+    }
 }
 
 /// What becomes of one request.

@@ -30,10 +30,10 @@ pub(super) fn give_up_in_children() {
 }
 
 /// A moment of this process, by its forks.
-#[cfg(any(feature = "serial", feature = "share"))]
+#[cfg(any(feature = "serial", feature = "tcp", feature = "share"))]
 pub(super) struct Forks(u64);
 
-#[cfg(any(feature = "serial", feature = "share"))]
+#[cfg(any(feature = "serial", feature = "tcp", feature = "share"))]
 impl Forks {
     /// Now, once none is under way.
     pub(super) fn now() -> Self {
@@ -97,7 +97,7 @@ mod tests {
     use crate::system::inherited::Kept;
 
     #[test]
-    #[cfg(any(feature = "serial", feature = "share"))]
+    #[cfg(any(feature = "serial", feature = "tcp", feature = "share"))]
     fn what_a_child_may_have_is_opened_again() {
         let mut opened = Vec::new();
         let kept = Kept::opened(|| {

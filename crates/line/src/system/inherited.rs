@@ -27,7 +27,7 @@ impl<T: std::os::fd::AsFd> Kept<T> {
     }
 
     /// What `open` opens, which no child has: one that was forked before it was listed would keep the lock that it is to get.
-    #[cfg(any(feature = "serial", feature = "share"))]
+    #[cfg(any(feature = "serial", feature = "tcp", feature = "share"))]
     pub(crate) fn opened(mut open: impl FnMut() -> std::io::Result<T>) -> std::io::Result<Self> {
         loop {
             let forks = at_fork::Forks::now();
@@ -45,7 +45,7 @@ impl<T> Kept<T> {
         Self { kept }
     }
 
-    #[cfg(any(feature = "serial", feature = "share"))]
+    #[cfg(any(feature = "serial", feature = "tcp", feature = "share"))]
     pub(crate) fn opened(mut open: impl FnMut() -> std::io::Result<T>) -> std::io::Result<Self> {
         open().map(Self::new)
     }
