@@ -67,7 +67,8 @@ class Service:
             self._over.set()
             for thread in threads:
                 thread.join()
-            status.remove()
+            with suppress(OSError):
+                status.remove()
 
     def end(self) -> None:
         """Ends it: `run` returns when all is closed."""
@@ -77,7 +78,9 @@ class Service:
         """Says how the service does, and that it lives: as long as each line has given somebody the turn meanwhile."""
         interval, turns, pinged = watchdog_interval(), {line.name: -1 for line in self._lines}, 0.0
         while not self._over.is_set() and (until is None or time.monotonic() < until):
-            status.write(self.status())
+            # A disk that is full ends nobody's service.
+            with suppress(OSError):
+                status.write(self.status())
             now = {line.name: line.turns for line in self._lines}
             if interval is not None and time.monotonic() >= pinged + interval:
                 if all(now[name] != turns[name] for name in now):
@@ -115,22 +118,28 @@ class _Served:
         self._why = ""
 
     def run(self) -> None:
-        """Serves it until the service ends."""
-        while not self._over.is_set():
-            try:
-                with ExitStack() as stack:
-                    self._begin(stack)
-                    stack.callback(self._close)
-                    self.tried.set()
-                    self._serve()
-            except (DrivebusError, OSError) as error:
-                if str(error) != self._why:
-                    self._why = str(error)
-                    self._tell(f"{self.name}: {error}; tried again each second")
-                self.turns += 1
+        """Serves it until the service ends. What nobody thought of ends it for all: it is started again."""
+        try:
+            while not self._over.is_set():
+                self._try()
+        finally:
+            self.tried.set()
+            self._over.set()
+
+    def _try(self) -> None:
+        try:
+            with ExitStack() as stack:
+                self._begin(stack)
+                stack.callback(self._close)
                 self.tried.set()
-                self._over.wait(_AGAIN)
-        self.tried.set()
+                self._serve()
+        except (DrivebusError, OSError) as error:
+            if str(error) != self._why:
+                self._why = str(error)
+                self._tell(f"{self.name}: {error}; tried again each second")
+            self.turns += 1
+            self.tried.set()
+            self._over.wait(_AGAIN)
 
     def _begin(self, stack: ExitStack) -> None:
         line = self._line
