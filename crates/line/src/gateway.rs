@@ -11,7 +11,7 @@
 //! | `tcp_request`, `rtu_request` | one request, taken out of what comes |
 //! | `network`, `rights` | what they may ask |
 //! | `wear` | how often they may write what wears a drive |
-//! | `commanders` | who commanded motion: a dead man's switch |
+//! | `commanders`, `silence` | who commanded motion, and is gone or silent: a dead man's switch |
 //! | `desk` | what one of them has asked, and when it has to be answered |
 //! | `clients` | how many there may be, and who gives way |
 //! | `audit`, `counts` | what they wrote, and what happened |
@@ -38,6 +38,7 @@ mod reader;
 mod requests;
 mod rights;
 mod rtu_request;
+mod silence;
 mod tcp_request;
 mod together;
 mod wear;

@@ -17,6 +17,7 @@ use crate::gateway::connection::{Connection, HURRY};
 use crate::gateway::desk::{Desk, Failed};
 use crate::gateway::mailbox::{Answered, Found, Mail, Mailbox};
 use crate::gateway::rights::{Judged, Means, Written, request_of};
+use crate::gateway::silence::Silence;
 use crate::gateway::together::Asker;
 use crate::gateway::writing::{Record, Step, Writing, outcome_of};
 use crate::options::CallOptions;
@@ -28,8 +29,7 @@ pub(super) struct Clerk {
     connection: Connection,
     desk: Desk,
     on_their_way: BTreeMap<u64, OnItsWay>,
-    /// Since when it is the client's turn: it asked last, or was answered last.
-    since: Instant,
+    silence: Silence,
 }
 
 /// A request on its way to the line.
@@ -44,7 +44,8 @@ enum OnItsWay {
 
 impl Clerk {
     pub(super) fn new(connection: Connection, desk: Desk) -> Self {
-        Self { connection, desk, on_their_way: BTreeMap::new(), since: monotonic() }
+        let silence = Silence::new(connection.common.dead_man, monotonic());
+        Self { connection, desk, on_their_way: BTreeMap::new(), silence }
     }
 
     /// Asks and answers until the connection ends; why it does.
@@ -65,7 +66,7 @@ impl Clerk {
                 }
             }
             if message.is_some() || !late.is_empty() {
-                self.since = now;
+                self.silence.heard(now);
             }
             if self.silent_at().is_some_and(|due| due <= now) {
                 self.connection.gone("is silent");
@@ -90,16 +91,15 @@ impl Clerk {
         self.desk.due().into_iter().chain(self.silent_at()).min()
     }
 
-    /// Until when the client has to ask something, lest what it commanded is halted; `None` while it waits for an answer.
+    /// Until when the client has to ask something, lest what it commanded is halted.
     fn silent_at(&self) -> Option<Instant> {
-        let common = &self.connection.common;
-        let within = common.dead_man.filter(|_| self.desk.due().is_none())?;
-        common.commanders.has(self.connection.place.number).then(|| self.since + within)
+        let ends = self.silence.ends(self.desk.due().is_some())?;
+        self.connection.common.commanders.has(self.connection.place.number).then_some(ends)
     }
 
     /// Asks the line, or answers at once.
     fn ask(&mut self, asked: &Asked, at: Instant, mailbox: &Arc<Mailbox>) -> Option<Vec<u8>> {
-        self.since = at;
+        self.silence.heard(at);
         self.connection.place.asks(at);
         let common = Arc::clone(&self.connection.common);
         common.counts.asked();
