@@ -99,6 +99,8 @@ def meeting_in_a_folder_of_its_own() -> Iterator[Path]:
     """Programs meet where no others do, and where the name of a socket is not too long (107 bytes)."""
     with tempfile.TemporaryDirectory(prefix="drivebus-") as folder, pytest.MonkeyPatch.context() as patch:
         patch.setenv("DRIVEBUS_RUNTIME_DIR", folder)
+        # Nor does a service of this machine have to do with it.
+        patch.setenv("DRIVEBUS_MACHINE_DIR", f"{folder}/machine")
         yield Path(folder) / "drivebus"
 
 
