@@ -69,6 +69,8 @@ class GatewayStats(NamedTuple):
         refused: Requests that are not allowed.
         failed: Requests that were answered by an exception: of the unit, or because the line brought no answer of it.
         late: Requests that were answered by 0BH because their time was up.
+        given_up: Requests of RTU over TCP whose client asked the next one instead of waiting. They are not answered, and
+            what was not sent of them was taken back.
         busy: Requests beyond the 16 that one connection may have on their way.
         together: Requests that were answered by the read that another one began.
         written: Writes that went out and were not refused by their unit.
@@ -85,6 +87,7 @@ class GatewayStats(NamedTuple):
     refused: int
     failed: int
     late: int
+    given_up: int
     busy: int
     together: int
     written: int
@@ -122,8 +125,8 @@ class Gateway:
     Args:
         bus: The line. It stays the caller's to close; where it is closed, clients are told 0AH.
         address: `host:port`, such as `127.0.0.1:1502` or `[::1]:1502`. Port 0 takes one that is free.
-        framing: `"tcp"` is Modbus TCP. `"rtu"` is RTU over TCP, as on a line: one request of a connection at a time,
-            and no answer to what is for all units.
+        framing: `"tcp"` is Modbus TCP. `"rtu"` is RTU over TCP, as on a line: who asks again is answered for that
+            alone, and what is for all units is not answered.
         answer_within: Seconds until an answer goes out at the latest, 0.05..60.
         allow: What clients may do. Empty: all may read. Drives that answer are asked who they are.
         dead_man: Seconds, 0.1..3600: a motor is halted when the client that set it in motion has hung up, or has asked

@@ -247,19 +247,43 @@ def rtu(unit: int, pdu: bytes) -> bytes:
     return frame + struct.pack("<H", drivebus.crc16(frame))
 
 
-def test_rtu_over_tcp_one_after_the_other(bus: Bus) -> None:
-    """Answers come in the order of the requests, though the first unit is silent; drivebus itself is a client, too."""
+def test_rtu_over_tcp(bus: Bus) -> None:
+    """A silent unit, one that answers, what is refused, somebody's own function; drivebus itself is a client, too."""
     read = b"\x03\x21\x03\x00\x01"
     with Gateway(bus, HERE, framing="rtu", answer_within=20.0) as gateway:
         with connected(gateway) as client:
-            client.sendall(rtu(9, read) + rtu(1, read) + rtu(1, b"\x06\x20\x00\x00\x01") + rtu(2, b"\x41\x01"))
-            expected = rtu(9, b"\x83\x0b") + rtu(1, b"\x03\x02\x01\xa0") + rtu(1, b"\x86\x01") + rtu(2, b"\xc1\x01")
-            assert exactly(client, len(expected)) == expected
+            for asked, expected in (
+                (rtu(9, read), rtu(9, b"\x83\x0b")),
+                (rtu(1, read), rtu(1, b"\x03\x02\x01\xa0")),
+                (rtu(1, b"\x06\x20\x00\x00\x01"), rtu(1, b"\x86\x01")),
+                (rtu(2, b"\x41\x01"), rtu(2, b"\xc1\x01")),
+            ):
+                client.sendall(asked)
+                assert exactly(client, len(expected)) == expected
             client.sendall(rtu(1, read)[:-1] + b"\0")
             assert is_cut_off(client)
         assert "a CRC that is wrong" in gateway.told()[-1]
         with Bus(f"socket://{gateway.address}") as other:
             assert other.read(1, 0x2103) == [IS]
+
+
+def test_who_speaks_rtu_and_asks_again_is_answered_for_that_alone() -> None:
+    """Nothing in an answer of RTU says which register it is of: one of an earlier request would be taken for the last one's."""
+    waits, says = rtu(9, b"\x03\x21\x04\x00\x01"), rtu(1, b"\x03\x02\x01\xa0")
+    with (
+        Simulator({1: "gd350", 2: "vfd500"}, transport="process") as simulator,
+        Bus(simulator) as bus,
+        Gateway(bus, HERE, framing="rtu", answer_within=20.0) as gateway,
+        connected(gateway) as client,
+    ):
+        for impatient in (waits, waits + waits, waits + rtu(2, b"\x03\x21\x04\x00\x01")):
+            client.sendall(impatient + rtu(1, b"\x03\x21\x03\x00\x01"))
+            assert exactly(client, len(says)) == says
+        client.sendall(waits)
+        seen(lambda: gateway.stats.requests == 9)
+        client.sendall(rtu(1, b"\x03\x21\x03\x00\x01"))
+        assert exactly(client, len(says)) == says
+        assert (gateway.stats.given_up, gateway.stats.answered) == (6, 4)
 
 
 def test_of_seventeen_from_one_host_one_gives_way(gateway: Gateway) -> None:

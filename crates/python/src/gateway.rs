@@ -119,6 +119,7 @@ impl Gateway {
             ("refused", stats.refused),
             ("failed", stats.failed),
             ("late", stats.late),
+            ("given_up", stats.given_up),
             ("busy", stats.busy),
             ("together", stats.together),
             ("written", stats.written),

@@ -51,7 +51,11 @@ impl Clerk {
     /// Asks and answers until the connection ends; why it does.
     pub(super) fn work(mut self, stream: &TcpStream, mailbox: &Arc<Mailbox>) -> String {
         let why = loop {
-            let message = match mailbox.next(self.next_due(), self.desk.is_free()) {
+            let found = mailbox.next(self.next_due());
+            if self.waits_for_the_last_alone(mailbox) {
+                self.give_up();
+            }
+            let message = match found {
                 Found::Over(why) => break why,
                 Found::Nothing => None,
                 Found::Mail(Mail::Asked(asked, at)) => self.ask(&asked, at, mailbox),
@@ -97,6 +101,21 @@ impl Clerk {
         self.connection.common.commanders.has(self.connection.place.number).then_some(ends)
     }
 
+    /// Whether the client has asked something else meanwhile, so that any other answer would be taken for that one's.
+    fn waits_for_the_last_alone(&self, mailbox: &Mailbox) -> bool {
+        !self.connection.common.framing.tells_answers_apart() && mailbox.has_asked()
+    }
+
+    /// What the client does not wait for any more is taken back.
+    fn give_up(&mut self) {
+        for number in self.desk.give_up() {
+            self.connection.common.counts.given_up();
+            if let Some(way) = self.on_their_way.remove(&number) {
+                self.take_back(&way);
+            }
+        }
+    }
+
     /// Asks the line, or answers at once.
     fn ask(&mut self, asked: &Asked, at: Instant, mailbox: &Arc<Mailbox>) -> Option<Vec<u8>> {
         self.silence.heard(at);
@@ -104,6 +123,11 @@ impl Clerk {
         let common = Arc::clone(&self.connection.common);
         common.counts.asked();
         self.connection.seat.asked();
+        self.give_up();
+        if self.waits_for_the_last_alone(mailbox) {
+            common.counts.given_up();
+            return None;
+        }
         let judged = common.rights.judge(self.connection.peer.ip(), asked.unit, &asked.pdu);
         match judged {
             Judged::Wrong(code) => return Some(self.desk.refused(asked, code)),

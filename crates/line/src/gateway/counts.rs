@@ -34,6 +34,9 @@ pub struct GatewayStats {
     pub failed: u64,
     /// Requests that were answered by 0BH because their time was up.
     pub late: u64,
+    /// Requests of RTU over TCP whose client asked the next one instead of waiting: they are not answered, and what was not sent
+    /// of them was taken back.
+    pub given_up: u64,
     /// Requests beyond those that one connection may have on their way.
     pub busy: u64,
     /// Requests that were answered by the read that another one began.
@@ -57,6 +60,7 @@ pub(super) struct Counts {
     refused: AtomicU64,
     failed: AtomicU64,
     late: AtomicU64,
+    given_up: AtomicU64,
     busy: AtomicU64,
     together: AtomicU64,
     written: AtomicU64,
@@ -136,6 +140,10 @@ impl Counts {
         count(&self.late);
     }
 
+    pub(super) fn given_up(&self) {
+        count(&self.given_up);
+    }
+
     pub(super) fn busy(&self) {
         count(&self.busy);
     }
@@ -169,6 +177,7 @@ impl Counts {
             refused: of(&self.refused),
             failed: of(&self.failed),
             late: of(&self.late),
+            given_up: of(&self.given_up),
             busy: of(&self.busy),
             together: of(&self.together),
             written: of(&self.written),

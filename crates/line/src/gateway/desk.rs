@@ -33,9 +33,12 @@ impl Desk {
         Self { within, most, framing, numbers: 0, open: BTreeMap::new() }
     }
 
-    /// Whether one more may be asked now, and be told from the others by its answer.
-    pub(super) fn is_free(&self) -> bool {
-        self.framing.tells_answers_apart() || self.open.is_empty()
+    /// The client asks the next one: what it does not wait for any more, where its answer would be taken for that of the next.
+    pub(super) fn give_up(&mut self) -> Vec<u64> {
+        if self.framing.tells_answers_apart() {
+            return Vec::new();
+        }
+        std::mem::take(&mut self.open).into_keys().collect()
     }
 
     /// Takes `asked`, which came `at` that moment, and gives its number; `None`: as many are on their way as may.

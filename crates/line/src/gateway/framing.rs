@@ -11,7 +11,8 @@ pub enum Framing {
     /// Modbus TCP: a header before each message, with a number that the answer brings back.
     #[default]
     Tcp,
-    /// Modbus RTU over TCP: unit, PDU and CRC, as on a line. One request at a time: nothing else says whose an answer is.
+    /// Modbus RTU over TCP: unit, PDU and CRC, as on a line. Nothing says whose an answer is, so who asks again is answered for
+    /// that alone.
     Rtu,
 }
 

@@ -81,16 +81,19 @@ impl Mailbox {
         self.changed.notify_all();
     }
 
-    /// The next thing, by `until`; what the client asks, only where that `may_be_asked`. That the connection is over goes
-    /// before all else.
-    pub(super) fn next(&self, until: Option<Instant>, may_be_asked: bool) -> Found {
+    /// Whether the client asks something that the desk has not taken yet.
+    pub(super) fn has_asked(&self) -> bool {
+        self.lock().asked > 0
+    }
+
+    /// The next thing, by `until`. That the connection is over goes before all else.
+    pub(super) fn next(&self, until: Option<Instant>) -> Found {
         let mut state = self.lock();
         loop {
             if let Some(why) = &state.over {
                 return Found::Over(why.clone());
             }
-            let is_next = |mail: &Mail| may_be_asked || !matches!(mail, Mail::Asked(..));
-            if let Some(mail) = state.mail.iter().position(is_next).and_then(|place| state.mail.remove(place)) {
+            if let Some(mail) = state.mail.pop_front() {
                 state.asked -= usize::from(matches!(mail, Mail::Asked(..)));
                 self.changed.notify_all();
                 return Found::Mail(mail);
