@@ -29,8 +29,8 @@ CRATES: dict[str, set[str]] = {
     "python": {"rtu", "drives", "line", "sim"},
 }
 
-# The trait of `line` and what its methods speak of: all that `sim` may name.
-LINE_TRAIT = {"Line", "LineClock", "PortError", "PortErrorKind"}
+# The trait of `line`, what its methods speak of, and pseudo-terminals: all that `sim` may name.
+LINE_TRAIT = {"Line", "LineClock", "PortError", "PortErrorKind", "pty"}
 
 # The rooms of `line`, each on those before it.
 LINE_ROOMS = [

@@ -109,6 +109,8 @@ pub use ports::adapters::facts::PortFacts;
 #[cfg(feature = "serial")]
 pub use ports::adapters::identity::Places;
 pub use ports::key::PortKey;
+#[cfg(target_os = "linux")]
+pub use ports::pty;
 pub use ports::set_again::SetAgain;
 pub use ports::url;
 pub use ports::words::WordError;

@@ -11,6 +11,8 @@ pub(crate) mod key;
 mod listening;
 #[cfg(feature = "tcp")]
 pub mod mbap;
+#[cfg(target_os = "linux")]
+pub mod pty;
 #[cfg(feature = "serial")]
 pub mod rs485;
 pub(crate) mod set_again;

@@ -6,9 +6,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use drivebus_line::pty::{PtyLink, open_raw};
+
 use crate::ears::Ear;
-use crate::link::Link;
-use crate::raw_pty::open_raw;
 use crate::shared::Shared;
 use crate::wire::Listener;
 
@@ -18,14 +18,14 @@ pub struct EarServer {
     shared: Arc<Shared>,
     listener: Listener,
     path: PathBuf,
-    _link: Option<Link>,
+    _link: Option<PtyLink>,
 }
 
 impl EarServer {
     pub(crate) fn start(shared: Arc<Shared>, link: Option<PathBuf>) -> io::Result<Self> {
         // Nobody holds the programs' side: our side shows whether one of them has it open.
         let (ours, _, path) = open_raw(shared.began_as.baud_rate())?;
-        let link = link.map(|link| Link::new(link, &path)).transpose()?;
+        let link = link.map(|link| PtyLink::new(link, &path)).transpose()?;
         let mut world = shared.lock();
         let listener = world.attach_ear();
         shared.ears.add(Ear { listener, ours });

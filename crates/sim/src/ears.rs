@@ -7,9 +7,9 @@ use drivebus_rtu::Instant;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::termios::{QueueSelector, tcflush};
 
-use crate::raw_pty::speed;
 use crate::wire::{Listener, at_speed};
 use crate::world::World;
+use drivebus_line::pty::speed;
 
 /// Every ear on one wire. They are locked after the world.
 #[derive(Debug, Default)]

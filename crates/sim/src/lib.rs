@@ -98,8 +98,6 @@ mod heard;
 #[cfg(unix)]
 mod lateness;
 mod line;
-#[cfg(target_os = "linux")]
-mod link;
 mod model;
 mod motor;
 mod outlet;
@@ -111,8 +109,6 @@ mod port;
 mod pty;
 mod ramp;
 mod random;
-#[cfg(target_os = "linux")]
-mod raw_pty;
 mod shared;
 mod simulator;
 mod spoil;

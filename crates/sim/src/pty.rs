@@ -5,11 +5,11 @@ use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::link::Link;
+use drivebus_line::pty::{PtyLink, open_raw, speed};
+
 use crate::outlet::Outlet;
 use crate::pacer::{Next, Served, Serving};
 use crate::port::Port;
-use crate::raw_pty::{open_raw, speed};
 use crate::shared::Shared;
 use crate::watch::{Key, Watch};
 
@@ -23,7 +23,7 @@ pub struct PtyServer(Arc<Socket>);
 impl PtyServer {
     pub(crate) fn start(shared: Arc<Shared>, link: Option<PathBuf>) -> io::Result<Self> {
         let pty = Pty::open(&shared)?;
-        let link = link.map(|path| Link::new(path, &pty.path)).transpose()?;
+        let link = link.map(|path| PtyLink::new(path, &pty.path)).transpose()?;
         let socket = Arc::new(Socket { shared, link, pty: Mutex::new(pty) });
         socket.shared.outlets.add(&socket);
         Ok(Self(socket))
@@ -39,7 +39,7 @@ impl PtyServer {
 #[derive(Debug)]
 struct Socket {
     shared: Arc<Shared>,
-    link: Option<Link>,
+    link: Option<PtyLink>,
     pty: Mutex<Pty>,
 }
 
