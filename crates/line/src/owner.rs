@@ -246,8 +246,12 @@ impl Owner {
         let is_noisy = tally.noise > 0 && !greets;
         let is_strange = !talk.strange.is_empty();
         let is_other = exchange.bytes > 0 || is_strange;
+        let occupied = exchange.sent.map_or(Duration::ZERO, |sent| {
+            exchange.ended.saturating_duration_since(sent).saturating_add(self.format.t35())
+        });
         self.stats().count(unit, |counters| {
             counters.requests += u64::from(exchange.sent.is_some());
+            counters.occupied = counters.occupied.saturating_add(occupied);
             counters.noise_events += u64::from(is_noisy);
             if has_seen_more {
                 counters.add(tally);

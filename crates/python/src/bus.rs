@@ -438,6 +438,7 @@ fn counters<'py>(py: Python<'py>, figures: &Counters) -> PyResult<Bound<'py, PyD
     all.set_item("other_functions", figures.other_functions)?;
     all.set_item("other_transactions", figures.other_transactions)?;
     all.set_item("noise_events", figures.noise_events)?;
+    all.set_item("occupied", figures.occupied.as_secs_f64())?;
     for (name, latency) in [("round_trip", &figures.round_trip), ("delay", &figures.delay)] {
         let times = PyDict::new(py);
         times.set_item("min", latency.min.as_secs_f64())?;

@@ -80,6 +80,8 @@ class UnitStats(Named[str, Any]):
         other_functions: Those of them to which the unit sent a whole frame of another function.
         other_transactions: Those of them that were answered under another transaction number of Modbus TCP.
         noise_events: How often bytes came that belong to no frame.
+        occupied: Seconds that requests had the line: each from its first bit until its answer was there or waited for
+            no more, and the silence after it.
         round_trip: From the first bit of the request to the last byte of the answer.
         delay: From the last character of the request to the first of the answer: how long unit, adapter and this
             computer took.
@@ -106,6 +108,7 @@ class UnitStats(Named[str, Any]):
     other_functions: int
     other_transactions: int
     noise_events: int
+    occupied: float
     round_trip: Latency
     delay: Latency
 

@@ -18,7 +18,7 @@ from drivebus.latch import Latch
 from drivebus.service.check import check
 from drivebus.service.notify import notify, watchdog_interval
 from drivebus.service.status import StatusFile
-from drivebus.site import Site, SiteAllow, SiteDrive, SiteLine, SiteTcp
+from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SiteLine
 
 __all__ = ["Service"]
 
@@ -48,7 +48,9 @@ class Service:
         self._site = site
         self._tell = tell
         self._over = Latch()
-        of_line = {name: [tcp for tcp in site.share.tcp if tcp.line == line] for name, line in site.lines.items()}
+        of_line = {
+            name: [each for each in site.share.gateways if each.line == line] for name, line in site.lines.items()
+        }
         self._lines = [_Served(site, line, of_line[name], tell, self._over) for name, line in site.lines.items()]
 
     def run(self, duration: float | None = None) -> None:
@@ -104,17 +106,18 @@ class _Served:
     """One line, opened again and again until the service ends."""
 
     def __init__(
-        self, site: Site, line: SiteLine, tcp: list[SiteTcp], tell: Callable[[str], None], over: Latch
+        self, site: Site, line: SiteLine, gateways: list[SiteGateway], tell: Callable[[str], None], over: Latch
     ) -> None:
         self.name = line.name
         self.turns = 0
         """How often the line gave this program the turn, and how often that was tried where it is not there."""
         self.tried = Latch()
         """Closed when it was tried to open it."""
-        self._site, self._line, self._tcp = site, line, tcp
+        self._site, self._line, self._told = site, line, gateways
         self._tell = tell
         self._over = over
         self._open: tuple[Bus, list[Gateway]] | None = None
+        self._before = (time.monotonic(), 0.0)
         self._why = ""
 
     def run(self) -> None:
@@ -155,22 +158,22 @@ class _Served:
         if line.rs485 is not None:
             options["rs485"] = {"mode": line.rs485}
         bus = stack.enter_context(Bus(line.port, **options))
-        gateways = [stack.enter_context(self._gateway(bus, tcp)) for tcp in self._tcp]
+        gateways = [stack.enter_context(self._gateway(bus, each)) for each in self._told]
         self._open, self._why = (bus, gateways), ""
         at = ", ".join(gateway.address for gateway in gateways)
         self._tell(f"{self.name}: {bus.port} is served{f' at {at}' if at else ''}")
 
-    def _gateway(self, bus: Bus, tcp: SiteTcp) -> Gateway:
+    def _gateway(self, bus: Bus, told: SiteGateway) -> Gateway:
         drives: dict[str, Drive] = {}
-        allow = [_allowed(bus, each, drives) for each in tcp.allow]
+        allow = [_allowed(bus, each, drives) for each in told.allow]
         audit = self._site.share.audit
         return Gateway(
             bus,
-            tcp.address,
-            framing=tcp.framing,
-            answer_within=tcp.answer_within,
+            told.address,
+            framing=told.framing,
+            answer_within=told.answer_within,
             allow=allow,
-            dead_man=tcp.dead_man,
+            dead_man=told.dead_man,
             audit=audit,
         )
 
@@ -205,16 +208,20 @@ class _Served:
             return {"port": self._line.port, "open": False, "why": self._why}
         bus, gateways = self._open
         stats = bus.stats()
+        (then, before), self._before = self._before, (time.monotonic(), stats.occupied)
+        # Opened again meanwhile, it counts from nothing.
+        occupied = stats.occupied - before if stats.occupied >= before else stats.occupied
         return {
             "port": bus.port,
             "open": True,
+            "occupied": round(min(occupied / max(self._before[0] - then, 1e-9), 1.0), 3),
             "requests": stats.requests,
             "answers": stats.answers,
             "timeouts": stats.timeouts,
             "reconnects": stats.reconnects,
             "hints": stats.hints,
             "programs": [program for program in stats.programs if program["here"]],
-            "tcp": {
+            "gateways": {
                 gateway.address: dict(zip(GatewayStats.__annotations__, gateway.stats, strict=True))
                 for gateway in gateways
             },

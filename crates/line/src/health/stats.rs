@@ -86,6 +86,9 @@ pub struct Counters {
     /// How often bytes came that belong to no frame: beside a request, or between two. Not before or at the first request of
     /// a connection: a server may greet.
     pub noise_events: u64,
+    /// How long requests had the line: each from its first bit until its answer was there or waited for no more, and the silence
+    /// after it.
+    pub occupied: Duration,
     /// From the first bit of the request to the last byte of the answer.
     pub round_trip: Latency,
     /// From the last character of the request to the first of the answer, as the times of characters are computed: how

@@ -44,8 +44,10 @@ def serve(session: Session, context: click.Context, checks: bool, shows: bool, d
     if checks:
         service.check(site)
         share = site.share
-        session.out.record({"file": str(site.path), "lines": len(site.lines), "tcp": len(share.tcp)})
-        session.out.say(f"{site.path}: {counted(len(site.lines), 'line')}, {len(share.tcp)} at Modbus TCP: no mistake")
+        session.out.record({"file": str(site.path), "lines": len(site.lines), "gateways": len(share.gateways)})
+        session.out.say(
+            f"{site.path}: {counted(len(site.lines), 'line')}, {counted(len(share.gateways), 'gateway')}: no mistake"
+        )
         return
     served = service.Service(site, remark)
 
@@ -66,13 +68,14 @@ def _show(session: Session, status: dict[str, Any]) -> None:
             session.out.say(f"{name}: {line['port']} is away: {line['why']}")
             continue
         session.out.say(
-            f"{name}: {line['port']}, {counted(line['requests'], 'request')}, {line['timeouts']} without an answer"
+            f"{name}: {line['port']}, {line['occupied']:.0%} occupied, {counted(line['requests'], 'request')}, "
+            f"{line['timeouts']} without an answer"
         )
         for program in line["programs"]:
             session.out.say(
                 f"{name}: {program['name']}, {counted(program['calls'], 'request')}, {program['answered']} answered"
             )
-        for address, of in line["tcp"].items():
+        for address, of in line["gateways"].items():
             session.out.say(
                 f"{name}: {address}, {counted(of['clients'], 'client')}, {counted(of['requests'], 'request')}: "
                 f"{of['answered']} answered, {of['failed']} failed, {of['late']} late, {of['refused']} refused, "
