@@ -69,8 +69,8 @@ class GatewayStats(NamedTuple):
         refused: Requests that are not allowed.
         failed: Requests that were answered by an exception: of the unit, or because the line brought no answer of it.
         late: Requests that were answered by 0BH because their time was up.
-        given_up: Requests of RTU over TCP whose client asked the next one instead of waiting. They are not answered, and
-            what was not sent of them was taken back.
+        given_up: Requests of RTU whose client asked the next one instead of waiting. They are not answered, and what
+            was not sent of them was taken back.
         busy: Requests beyond the 16 that one connection may have on their way.
         together: Requests that were answered by the read that another one began.
         written: Writes that went out and were not refused by their unit.
@@ -124,7 +124,11 @@ class Gateway:
 
     Args:
         bus: The line. It stays the caller's to close; where it is closed, clients are told 0AH.
-        address: `host:port`, such as `127.0.0.1:1502` or `[::1]:1502`. Port 0 takes one that is free.
+        address: `host:port`, such as `127.0.0.1:1502` or `[::1]:1502`. Port 0 takes one that is free. Or a path that
+            begins with `/`: a link to a pseudo-terminal, for programs of this computer that know serial ports alone.
+            They open it as one, without parity, and speak RTU. One has it open at a time, of this user or of the bus's
+            group, and rules for networks see it at 127.0.0.1. A link to a pseudo-terminal that is there is replaced.
+            Linux only.
         framing: `"tcp"` is Modbus TCP. `"rtu"` is RTU over TCP, as on a line: who asks again is answered for that
             alone, and what is for all units is not answered.
         answer_within: Seconds until an answer goes out at the latest, 0.05..60.
@@ -143,7 +147,7 @@ class Gateway:
     def __init__(
         self,
         bus: Bus,
-        address: str,
+        address: str | os.PathLike[str],
         *,
         framing: Literal["tcp", "rtu"] = "tcp",
         answer_within: float = 1.0,
@@ -154,9 +158,6 @@ class Gateway:
         core = getattr(bus, "line", None)
         if not isinstance(core, _native.Bus):
             raise BadArgument(f"bus is {type(bus).__name__}, and has to be a drivebus.Bus")
-        host, colon, port = str(address).rpartition(":")
-        if not (host and colon and port.isdecimal() and int(port) <= 0xFFFF):
-            raise BadArgument(f"address is {address!r}, and has to be host:port, such as 127.0.0.1:1502")
         within = checks.number("answer_within", answer_within, 0.05, MOST_WITHIN)
         rules = [rule for each in allow for rule in _rules(each, bus)]
         silence = None if dead_man in (None, "off") else checks.number("dead_man", dead_man, *DEAD_MAN)
@@ -167,7 +168,7 @@ class Gateway:
             )
         self._native = _native.Gateway(
             core,
-            address,
+            _address(address),
             within,
             rtu=checks.one_of("framing", framing, FRAMINGS) == "rtu",
             rules=rules,
@@ -179,7 +180,7 @@ class Gateway:
 
     @property
     def address(self) -> str:
-        """Where it listens: `host:port`."""
+        """Where it listens: `host:port`, or the path of the link to its pseudo-terminal."""
         return self._native.address
 
     @property
@@ -210,6 +211,16 @@ class Gateway:
 
     def __repr__(self) -> str:
         return f"<Gateway at {self.address}>"
+
+
+def _address(given: str | os.PathLike[str]) -> str:
+    address = str(given)
+    host, colon, port = address.rpartition(":")
+    if not (address.startswith("/") or (host and colon and port.isdecimal() and int(port) <= 0xFFFF)):
+        raise BadArgument(
+            f"address is {address!r}, and has to be host:port, such as 127.0.0.1:1502, or a path that begins with /"
+        )
+    return address
 
 
 def _rules(allow: Allow, bus: Bus) -> Iterator[_Rule]:

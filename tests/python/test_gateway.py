@@ -268,7 +268,7 @@ def test_rtu_over_tcp(bus: Bus) -> None:
 
 
 def test_who_speaks_rtu_and_asks_again_is_answered_for_that_alone() -> None:
-    """Nothing in an answer of RTU says which register it is of: one of an earlier request would be taken for the last one's."""
+    """Nothing in an answer says which register it is of: an earlier one would be taken for that of the last request."""
     waits, says = rtu(9, b"\x03\x21\x04\x00\x01"), rtu(1, b"\x03\x02\x01\xa0")
     with (
         Simulator({1: "gd350", 2: "vfd500"}, transport="process") as simulator,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -13,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import minimalmodbus
 import pytest
 
 from drivebus import Simulator
@@ -58,6 +60,12 @@ drives = ["pump1"]
 commands = ["run", "setpoint"]
 
 [[share.tcp.allow]]
+
+[[share.pty]]
+path = "{folder}/plc"
+
+[[share.pty.allow]]
+drives = ["pump1"]
 """
 
 
@@ -68,14 +76,14 @@ def serve(file: Path, *words: str, **options: object) -> subprocess.CompletedPro
 
 def file_of(folder: Path, port: object = "sim://gd350", tcp: int = 1502) -> Path:
     file = folder / "drivebus.toml"
-    file.write_text(PLANT.format(port=port, tcp=tcp))
+    file.write_text(PLANT.format(port=port, tcp=tcp, folder=folder))
     return file
 
 
 def test_a_file_without_mistakes(tmp_path: Path) -> None:
     done = serve(file_of(tmp_path), "--check")
     assert (done.returncode, done.stderr) == (0, "")
-    assert "1 line, 1 at Modbus TCP: no mistake" in done.stdout
+    assert "1 line, 2 gateways: no mistake" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -101,6 +109,8 @@ def test_a_file_without_mistakes(tmp_path: Path) -> None:
         ("[[share.tcp.allow]]\n", "[share.tcp.allow]\n", 35, "not TOML"),
         ('audit = "audit.jsonl"', "audit = 3", 23, "not a text"),
         ('audit = "audit.jsonl"', 'audits = "a"', 23, 'did you mean "audit"'),
+        ('path = "/', 'path = "', 38, 'not a path that begins with "/"'),
+        ("[[share.pty.allow]]\n", '[[share.pty.allow]]\nnetworks = ["::1"]\n', 41, '"networks"'),
         ('address = "127', 'line = "yard"\naddress = "127', 26, 'there is no line "yard"'),
     ],
 )
@@ -227,13 +237,25 @@ def test_its_status(tmp_path: Path) -> None:
                     check=True,
                     env=environment,
                 )
-                return json.loads(done.stdout)["lines"]["hall"]["tcp"][f"127.0.0.1:{tcp}"]  # type: ignore[no-any-return]
+                return json.loads(done.stdout)["lines"]["hall"]["gateways"][f"127.0.0.1:{tcp}"]  # type: ignore[no-any-return]
 
-            seen(lambda: status()["requests"] == 1)
+            seen(lambda: status()["answered"] == 1)
             assert status()["clients"] == 1
             shown = serve(file, "--status", env=environment).stdout
             assert "1 client, 1 request: 1 answered" in shown
             assert f"client 127.0.0.1:{client.getsockname()[1]}, 1 request, 1 answered" in shown
+            assert f"{file.parent}/plc, 0 clients, 0 requests" in shown
+            assert re.search(r"hall: \S+, \d+% occupied, \d+ requests", shown)
+
+
+@NO_PTY
+def test_a_program_that_knows_serial_ports_alone(tmp_path: Path) -> None:
+    with plant(tmp_path) as (_, file, _, environment), service(file, environment):
+        master = minimalmodbus.Instrument(str(tmp_path / "plc"), 1)
+        master.serial.timeout = 20
+        assert master.read_register(0x2103) == 0x01A0
+        with pytest.raises(minimalmodbus.IllegalRequestError):
+            master.write_register(0x2000, 1, functioncode=6)
 
 
 @NO_PTY

@@ -1,4 +1,5 @@
-//! Modbus TCP, served, and RTU over TCP: programs that speak it read the units of a line, in the queue of the bus that has it.
+//! Modbus TCP, served, and RTU over TCP or a pseudo-terminal: programs that speak it read the units of a line, in the queue
+//! of the bus that has it.
 //!
 //! Each connection is a program of the queue: one that asks much takes no more turns than one that asks little, and a stop
 //! goes before them all. What cannot be answered in time is answered by 0BH, and never afterwards for that transaction; what
@@ -14,6 +15,8 @@
 //! | `commanders`, `silence` | who commanded motion, and is gone or silent: a dead man's switch |
 //! | `desk` | what one of them has asked, and when it has to be answered |
 //! | `clients` | how many there may be, and who gives way |
+//! | `stream`, `terminal` | what connects one: over the network, or a pseudo-terminal |
+//! | `door`, `terminal_door` | where they come in |
 //! | `audit`, `counts` | what they wrote, and what happened |
 //! | `together` | reads that wait, and who waits for the same |
 //! | `common`, `connection` | what all connections have in common, and one of them |
@@ -31,6 +34,7 @@ mod common;
 mod connection;
 mod counts;
 mod desk;
+mod door;
 mod framing;
 mod mailbox;
 mod network;
@@ -39,13 +43,21 @@ mod requests;
 mod rights;
 mod rtu_request;
 mod silence;
+mod stream;
 mod tcp_request;
+#[cfg(target_os = "linux")]
+mod terminal;
+#[cfg(target_os = "linux")]
+mod terminal_door;
 mod together;
 mod wear;
 mod writing;
 
+use std::fmt;
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs as _};
+#[cfg(target_os = "linux")]
+use std::path::Path;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -64,10 +76,13 @@ use crate::gateway::audit::Audit;
 use crate::gateway::clients::Clients;
 use crate::gateway::commanders::Commanders;
 use crate::gateway::common::{Common, Seen};
-use crate::gateway::connection::Connection;
 use crate::gateway::counts::Counts;
+use crate::gateway::door::{Hall, TcpDoor};
+#[cfg(target_os = "linux")]
+use crate::gateway::terminal::Bell;
+#[cfg(target_os = "linux")]
+use crate::gateway::terminal_door::{Found, TerminalDoor};
 use crate::gateway::wear::Wear;
-use crate::system::clock::{LOOK_UP, monotonic};
 use crate::system::inherited::Kept;
 use crate::system::process::Process;
 
@@ -147,8 +162,27 @@ impl Default for GatewayOptions {
     }
 }
 
-/// A server for Modbus TCP, or for RTU over TCP, before a [`Bus`], until it is dropped. It keeps the bus from nothing: where that is closed, clients
-/// are told 0AH.
+/// Where a [`Gateway`] is found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Address {
+    /// Over the network.
+    Tcp(SocketAddr),
+    /// By programs of this computer: a link to a pseudo-terminal, which they open as a serial port.
+    Terminal(PathBuf),
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tcp(address) => address.fmt(f),
+            Self::Terminal(link) => link.display().fmt(f),
+        }
+    }
+}
+
+/// A server for Modbus TCP, or for RTU over TCP or a pseudo-terminal, before a [`Bus`], until it is dropped. It keeps the bus
+/// from nothing: where that is closed, clients are told 0AH.
 ///
 /// ```no_run
 /// # fn example(bus: std::sync::Arc<drivebus_line::Bus>) -> std::io::Result<()> {
@@ -161,13 +195,15 @@ impl Default for GatewayOptions {
 /// ```
 #[derive(Debug)]
 pub struct Gateway {
-    address: SocketAddr,
+    address: Address,
     clients: Arc<Clients>,
     counts: Arc<Counts>,
     is_closed: Arc<AtomicBool>,
     opened_by: Process,
     /// The thread at the door, until it is told to end.
     door: Mutex<Option<JoinHandle<()>>>,
+    #[cfg(target_os = "linux")]
+    closing: Option<Arc<Bell>>,
 }
 
 impl Gateway {
@@ -178,53 +214,59 @@ impl Gateway {
     /// The system's: the address is not one of this machine, is taken, or may not be listened at; the audit cannot be written.
     /// [`io::ErrorKind::InvalidInput`]: clients may move a motor, and nothing says what becomes of it when they are gone.
     pub fn open(bus: &Arc<Bus>, address: &str, options: GatewayOptions) -> io::Result<Self> {
-        let GatewayOptions { answer_within: within, framing, rights, dead_man, audit } = options;
-        if rights.moves_any() && dead_man.is_none() {
-            return Err(io::Error::new(
-                io::ErrorKind::InvalidInput,
-                "clients may move a motor, and nothing says what becomes of it when they are gone",
-            ));
-        }
-        let counts = Arc::<Counts>::default();
-        let tells = Arc::clone(&counts);
-        let audit = audit.map(|path| Audit::open(&path, move |why| tells.tell(why))).transpose()?.unwrap_or_default();
+        let hall = hall(bus, options)?;
         let addresses: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
         let listener = Kept::new(TcpListener::bind(&addresses[..])?);
-        let gateway = Self {
-            address: listener.local_addr()?,
-            clients: Arc::default(),
-            counts: Arc::clone(&counts),
-            is_closed: Arc::default(),
-            opened_by: Process::current(),
-            door: Mutex::default(),
-        };
-        let common = Common {
-            bus: Arc::downgrade(bus),
-            within,
-            framing,
-            rights,
-            dead_man: match dead_man {
-                Some(DeadMan::After(silence)) => Some(silence),
-                Some(DeadMan::Off) | None => None,
-            },
-            audit,
-            counts,
-            together: Arc::default(),
-            wear: Wear::default(),
-            commanders: Commanders::default(),
-            seen: Seen::default(),
-        };
-        let (clients, is_closed) = (Arc::clone(&gateway.clients), Arc::clone(&gateway.is_closed));
-        let door = Door { common: Arc::new(common), clients, is_closed };
-        let standing =
-            thread::Builder::new().name("drivebus-tcp-door".to_owned()).spawn(move || door.stand(&listener))?;
-        *gateway.door.lock().unwrap_or_else(PoisonError::into_inner) = Some(standing);
+        let gateway = Self::behind(Address::Tcp(listener.local_addr()?), &hall);
+        let door = TcpDoor { hall, listener, is_closed: Arc::clone(&gateway.is_closed) };
+        gateway.begin("drivebus-tcp-door", move || door.stand())?;
         Ok(gateway)
     }
 
-    /// Where it listens.
-    pub const fn address(&self) -> SocketAddr {
-        self.address
+    /// Serves who opens a pseudo-terminal, which is found by `link` and speaks RTU whatever the framing of `options`: for
+    /// programs that know serial ports alone. One program at a time has it open, of this user or of the group of the bus.
+    /// Rules for networks see it at 127.0.0.1. Parity cannot be set on a pseudo-terminal: the program has to use none. Linux
+    /// only.
+    ///
+    /// # Errors
+    ///
+    /// As of [`open`](Self::open). [`io::ErrorKind::AlreadyExists`]: something stands there that is no link to a
+    /// pseudo-terminal.
+    #[cfg(target_os = "linux")]
+    pub fn open_terminal(bus: &Arc<Bus>, link: &Path, options: GatewayOptions) -> io::Result<Self> {
+        let hall = hall(bus, options.framing(Framing::Rtu))?;
+        let (group, baud_rate) = (bus.options().group, bus.options().format.baud_rate());
+        let found = Found::new(link, baud_rate, group)?;
+        let closing = Arc::new(Bell::new()?);
+        let mut gateway = Self::behind(Address::Terminal(link.to_owned()), &hall);
+        gateway.closing = Some(Arc::clone(&closing));
+        let door = TerminalDoor { hall, found, name: link.display().to_string(), closing };
+        gateway.begin("drivebus-pty-door", move || door.stand())?;
+        Ok(gateway)
+    }
+
+    fn behind(address: Address, hall: &Hall) -> Self {
+        Self {
+            address,
+            clients: Arc::clone(&hall.clients),
+            counts: Arc::clone(&hall.common.counts),
+            is_closed: Arc::default(),
+            opened_by: Process::current(),
+            door: Mutex::default(),
+            #[cfg(target_os = "linux")]
+            closing: None,
+        }
+    }
+
+    fn begin(&self, name: &str, stand: impl FnOnce() + Send + 'static) -> io::Result<()> {
+        let standing = thread::Builder::new().name(name.to_owned()).spawn(stand)?;
+        *self.door.lock().unwrap_or_else(PoisonError::into_inner) = Some(standing);
+        Ok(())
+    }
+
+    /// Where it is found.
+    pub const fn address(&self) -> &Address {
+        &self.address
     }
 
     /// What has happened so far.
@@ -243,13 +285,25 @@ impl Gateway {
         if self.opened_by.is_current() && !self.is_closed.swap(true, Ordering::AcqRel) {
             self.clients.close(TO_END);
             let standing = self.door.lock().unwrap_or_else(PoisonError::into_inner).take();
-            // It is woken by somebody who knocks. Where nobody can, nobody has to be kept out, and it is left to stand.
-            if TcpStream::connect_timeout(&reachable(self.address), TO_END).is_ok()
+            if self.is_heard_at_the_door()
                 && let Some(standing) = standing
             {
                 // One that panicked stands there no more either.
                 let _ = standing.join();
             }
+        }
+    }
+
+    /// Wakes who stands at the door; false: that cannot be, and nobody has to be kept out.
+    fn is_heard_at_the_door(&self) -> bool {
+        #[cfg(target_os = "linux")]
+        if let Some(closing) = &self.closing {
+            closing.ring();
+            return true;
+        }
+        match self.address {
+            Address::Tcp(address) => TcpStream::connect_timeout(&reachable(address), TO_END).is_ok(),
+            Address::Terminal(_) => false,
         }
     }
 }
@@ -260,6 +314,37 @@ impl Drop for Gateway {
     }
 }
 
+/// What is behind the door of a gateway that behaves as `options` say.
+fn hall(bus: &Arc<Bus>, options: GatewayOptions) -> io::Result<Hall> {
+    let GatewayOptions { answer_within: within, framing, rights, dead_man, audit } = options;
+    if rights.moves_any() && dead_man.is_none() {
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "clients may move a motor, and nothing says what becomes of it when they are gone",
+        ));
+    }
+    let counts = Arc::<Counts>::default();
+    let tells = Arc::clone(&counts);
+    let audit = audit.map(|path| Audit::open(&path, move |why| tells.tell(why))).transpose()?.unwrap_or_default();
+    let common = Common {
+        bus: Arc::downgrade(bus),
+        within,
+        framing,
+        rights,
+        dead_man: match dead_man {
+            Some(DeadMan::After(silence)) => Some(silence),
+            Some(DeadMan::Off) | None => None,
+        },
+        audit,
+        counts,
+        together: Arc::default(),
+        wear: Wear::default(),
+        commanders: Commanders::default(),
+        seen: Seen::default(),
+    };
+    Ok(Hall { common: Arc::new(common), clients: Arc::default() })
+}
+
 /// Where this machine reaches what listens at `address`.
 fn reachable(address: SocketAddr) -> SocketAddr {
     let ip = match address.ip() {
@@ -268,43 +353,4 @@ fn reachable(address: SocketAddr) -> SocketAddr {
         ip => ip,
     };
     SocketAddr::new(ip, address.port())
-}
-
-/// Who lets clients in.
-struct Door {
-    common: Arc<Common>,
-    clients: Arc<Clients>,
-    is_closed: Arc<AtomicBool>,
-}
-
-impl Door {
-    fn stand(&self, listener: &TcpListener) {
-        while !self.is_closed.load(Ordering::Acquire) {
-            let served = match listener.accept() {
-                Ok(_) if self.is_closed.load(Ordering::Acquire) => return,
-                Ok((stream, peer)) => self.let_in(stream, peer),
-                Err(error) => Err(error),
-            };
-            if let Err(error) = served {
-                self.common.counts.tell(format!("a client cannot be let in now: {error}"));
-                // No file is left to open, most likely: that does not end by being tried at once.
-                thread::sleep(LOOK_UP);
-            }
-        }
-    }
-
-    fn let_in(&self, stream: TcpStream, peer: SocketAddr) -> io::Result<()> {
-        let Some(bus) = self.common.bus.upgrade() else { return Ok(()) };
-        let (stream, host) = (Arc::new(Kept::new(stream)), peer.ip().to_canonical());
-        let peer = SocketAddr::new(host, peer.port());
-        let seat = bus.seat_of(format!("client {peer}"));
-        drop(bus);
-        let Some((place, gave_way)) = self.clients.enter(Arc::clone(&stream), host, monotonic()) else { return Ok(()) };
-        if gave_way {
-            self.common.counts.gave_way(peer);
-        }
-        self.common.counts.let_in();
-        let common = Arc::clone(&self.common);
-        reader::serve(Connection { common, seat, peer, name: peer.to_string(), place, stream })
-    }
 }

@@ -1,6 +1,7 @@
-//! `Gateway` for Python: a server for Modbus TCP before a bus.
+//! `Gateway` for Python: a server for Modbus TCP, or RTU, before a bus.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use drivebus_line::gateway::{
     DeadMan, Framing, Gateway as CoreGateway, GatewayOptions, Halts, Means, Network, Rights, Rule, Writable,
@@ -56,6 +57,17 @@ fn writable((table, address, words, means, instead, name, shown_at): GivenWrite)
     Ok(Writable::new(table, address, name).words(words).means(means).shown_at(shown_at))
 }
 
+/// Opens it at `host:port`, or at a pseudo-terminal where `address` is a path.
+fn open(bus: &Arc<drivebus_line::Bus>, address: &str, options: GatewayOptions) -> std::io::Result<CoreGateway> {
+    if !address.starts_with('/') {
+        return CoreGateway::open(bus, address, options);
+    }
+    #[cfg(target_os = "linux")]
+    return CoreGateway::open_terminal(bus, std::path::Path::new(address), options);
+    #[cfg(not(target_os = "linux"))]
+    Err(std::io::Error::new(std::io::ErrorKind::Unsupported, "pseudo-terminals are served on Linux alone"))
+}
+
 /// A server for Modbus TCP, until it is closed.
 #[pyclass(frozen, module = "drivebus._native")]
 #[derive(Debug)]
@@ -89,12 +101,12 @@ impl Gateway {
             .audit(audit);
         let options = if rules.is_empty() { options } else { options.rights(rights(rules, units)?) };
         let core = &bus.get().core;
-        let opened = bus.py().detach(|| CoreGateway::open(core, address, options));
+        let opened = bus.py().detach(|| open(core, address, options));
         opened.map(|core| Self { core }).map_err(|error| {
             let kind = match error.kind() {
-                std::io::ErrorKind::AddrInUse => PortErrorKind::Busy,
+                std::io::ErrorKind::AddrInUse | std::io::ErrorKind::AlreadyExists => PortErrorKind::Busy,
                 std::io::ErrorKind::PermissionDenied => PortErrorKind::Denied,
-                std::io::ErrorKind::AddrNotAvailable => PortErrorKind::NotFound,
+                std::io::ErrorKind::AddrNotAvailable | std::io::ErrorKind::NotFound => PortErrorKind::NotFound,
                 _ => PortErrorKind::Other,
             };
             port_error(&PortError::new(kind, address, format!("nothing can listen there: {error}")))

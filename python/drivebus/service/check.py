@@ -12,7 +12,7 @@ from drivebus.operations import network_rights
 from drivebus.operations.last_will import WAYS
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
-from drivebus.site import Site, SiteAllow, SiteDrive, SiteTcp
+from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway
 
 __all__ = ["check"]
 
@@ -23,20 +23,20 @@ def check(site: Site) -> None:
     Raises:
         NotAllowed: Something cannot be; each mistake is named with its line.
     """
-    wrong = {mistake for tcp in site.share.tcp for mistake in _of_address(tcp)}
+    wrong = {mistake for gateway in site.share.gateways for mistake in _of_gateway(gateway)}
     if wrong:
         count = "one mistake" if len(wrong) == 1 else f"{len(wrong)} mistakes"
         told = [f"{site.path}:{line}: {reason}" for line, reason in sorted(wrong)]
         raise BadArgument("\n".join([f"{site.path} has {count}; nothing was opened:", *told]))
 
 
-def _of_address(tcp: SiteTcp) -> Iterator[tuple[int, str]]:
+def _of_gateway(gateway: SiteGateway) -> Iterator[tuple[int, str]]:
     moved: list[str] = []
-    for allow in tcp.allow:
+    for allow in gateway.allow:
         yield from _of_rule(allow, moved)
-    if moved and tcp.dead_man is None:
+    if moved and gateway.dead_man is None:
         yield (
-            tcp.at,
+            gateway.at,
             f"clients may move {moved[0]}, and nothing says what becomes of it when they are gone: say dead_man, "
             'seconds after which it is halted, or "off" if it shall run on',
         )

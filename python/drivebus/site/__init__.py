@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from drivebus.site.config import FILE, Site
     from drivebus.site.entries import SiteDrive, SiteLine
     from drivebus.site.known_families import families_on, forget, known_family, remember
-    from drivebus.site.share import SiteAllow, SiteShare, SiteTcp
+    from drivebus.site.share import SiteAllow, SiteGateway, SiteShare
     from drivebus.site.state_folder import state_file
 
 __all__ = [
@@ -16,9 +16,9 @@ __all__ = [
     "Site",
     "SiteAllow",
     "SiteDrive",
+    "SiteGateway",
     "SiteLine",
     "SiteShare",
-    "SiteTcp",
     "families_on",
     "forget",
     "known_family",
@@ -33,7 +33,7 @@ if not TYPE_CHECKING:
             "config": ("FILE", "Site"),
             "entries": ("SiteDrive", "SiteLine"),
             "known_families": ("families_on", "forget", "known_family", "remember"),
-            "share": ("SiteAllow", "SiteShare", "SiteTcp"),
+            "share": ("SiteAllow", "SiteShare", "SiteGateway"),
             "state_folder": ("state_file",),
         },
     )

@@ -28,10 +28,14 @@ from drivebus import checks
 from drivebus.site.entries import SiteDrive, SiteLine
 from drivebus.site.reading import Key, Reading, Wrong, flag, listed, number, one_of, quoted, text, whole
 
-__all__ = ["SiteAllow", "SiteShare", "SiteTcp", "share_of"]
+__all__ = ["SiteAllow", "SiteGateway", "SiteShare", "share_of"]
 
 _WITHIN, _DEAD_MAN = (0.05, 60.0), (0.1, 3600.0)
 """Seconds, as `drivebus.Gateway` takes them."""
+
+_OF_BOTH = ("line", "answer_within", "dead_man", "allow")
+_RULE = ("networks", "drives", "units", "functions", "write", "commands")
+"""The keys of a table for clients over the network or at a pseudo-terminal, and of its rules."""
 
 
 @dataclass(frozen=True)
@@ -58,12 +62,12 @@ class SiteAllow:
 
 
 @dataclass(frozen=True)
-class SiteTcp:
-    """Where clients of Modbus TCP find a line, as `drivebus.Gateway` has it.
+class SiteGateway:
+    """Where clients of Modbus find a line, as `drivebus.Gateway` has it.
 
     Attributes:
         line: The line.
-        address: `host:port`.
+        address: `host:port`, or the path of a pseudo-terminal.
         framing: `"tcp"`, or `"rtu"` for RTU over TCP.
         answer_within: Seconds until an answer goes out at the latest.
         dead_man: Seconds of silence after which a motor is halted, `"off"`, or None where it is not said.
@@ -88,13 +92,13 @@ class SiteShare:
         group: The group of the system whose users may use them through the service; None: its own user alone.
         audit: The file that each write over the network is appended to; None: none.
         realtime: Whether the threads of the lines go before all others of the computer.
-        tcp: Where clients over the network find them.
+        gateways: Where clients find them: over the network, or as a serial port.
     """
 
     group: str | None = None
     audit: Path | None = None
     realtime: bool = False
-    tcp: tuple[SiteTcp, ...] = ()
+    gateways: tuple[SiteGateway, ...] = ()
 
 
 def share_of(
@@ -108,13 +112,15 @@ def share_of(
     if not isinstance(table, dict):
         file.complain(("share",), "share is a table: [share]")
         return SiteShare()
-    file.check_keys(table, ("group", "audit", "realtime", "tcp"), ("share",))
+    file.check_keys(table, ("group", "audit", "realtime", "tcp", "pty"), ("share",))
     group = file.value(("share",), table, "group", text)
     audit = file.value(("share",), table, "audit", text)
     realtime = file.value(("share",), table, "realtime", flag) or False
-    reader = _Tcp(file, lines, drives, groups)
-    tcp = [each for each in _tables(file, table, ("share", "tcp"), reader.read) if each is not None]
-    return SiteShare(group, None if audit is None else file.path.parent / audit, realtime, tuple(tcp))
+    reader = _Gateways(file, lines, drives, groups)
+    tcp = _tables(file, table, ("share", "tcp"), reader.tcp)
+    pty = _tables(file, table, ("share", "pty"), reader.pty)
+    gateways = tuple(each for each in [*tcp, *pty] if each is not None)
+    return SiteShare(group, None if audit is None else file.path.parent / audit, realtime, gateways)
 
 
 def _tables(file: Reading, table: Mapping[str, Any], where: Key, read: Any) -> list[Any]:
@@ -129,34 +135,49 @@ def _tables(file: Reading, table: Mapping[str, Any], where: Key, read: Any) -> l
 
 
 @dataclass(frozen=True)
-class _Tcp:
-    """Reads the tables of addresses."""
+class _Gateways:
+    """Reads the tables of addresses and of pseudo-terminals."""
 
     file: Reading
     lines: Mapping[str, SiteLine]
     drives: Mapping[str, SiteDrive]
     groups: Mapping[str, tuple[SiteDrive, ...]]
 
-    def read(self, table: dict[str, Any], where: Key) -> SiteTcp | None:
+    def tcp(self, table: dict[str, Any], where: Key) -> SiteGateway | None:
         file = self.file
-        file.check_keys(table, ("line", "address", "framing", "answer_within", "dead_man", "allow"), where)
-        name = file.value(where, table, "line", text, needed=len(self.lines) != 1)
+        file.check_keys(table, ("address", "framing", *_OF_BOTH), where)
         address = file.value(where, table, "address", _address, needed=True)
         framing: Literal["tcp", "rtu"] = file.value(where, table, "framing", one_of("tcp", "rtu")) or "tcp"
+        return self._read(table, where, address, framing, _RULE)
+
+    def pty(self, table: dict[str, Any], where: Key) -> SiteGateway | None:
+        self.file.check_keys(table, ("path", *_OF_BOTH), where)
+        path = self.file.value(where, table, "path", _absolute, needed=True)
+        return self._read(table, where, path, "rtu", tuple(key for key in _RULE if key != "networks"))
+
+    def _read(
+        self,
+        table: dict[str, Any],
+        where: Key,
+        address: str | None,
+        framing: Literal["tcp", "rtu"],
+        rule: tuple[str, ...],
+    ) -> SiteGateway | None:
+        file = self.file
+        name = file.value(where, table, "line", text, needed=len(self.lines) != 1)
         within = file.value(where, table, "answer_within", number(*_WITHIN))
         dead_man = file.value(where, table, "dead_man", _dead_man)
         line = self.lines.get(name) if name else next(iter(self.lines.values()), None)
         if name is not None and line is None:
             hint = checks.closest(name, self.lines)
             file.complain((*where, "line"), f'there is no line "{name}"{hint}; there are {quoted(self.lines)}')
-        allow = _tables(file, table, (*where, "allow"), lambda each, there: self._allow(each, there, line))
+        allow = _tables(file, table, (*where, "allow"), lambda each, there: self._allow(each, there, line, rule))
         if line is None or address is None:
             return None
-        return SiteTcp(line, address, framing, within or 1.0, dead_man, tuple(allow), file.line_of(where))
+        return SiteGateway(line, address, framing, within or 1.0, dead_man, tuple(allow), file.line_of(where))
 
-    def _allow(self, table: dict[str, Any], where: Key, line: SiteLine | None) -> SiteAllow:
+    def _allow(self, table: dict[str, Any], where: Key, line: SiteLine | None, keys: tuple[str, ...]) -> SiteAllow:
         file = self.file
-        keys = ("networks", "drives", "units", "functions", "write", "commands")
         file.check_keys(table, keys, where)
         networks = file.value(where, table, "networks", listed(_network, '["192.168.7.0/24"]'))
         names = file.value(where, table, "drives", listed(text, '["pump1"]')) or []
@@ -191,6 +212,12 @@ def _address(value: Any) -> str:
     if not isinstance(value, str) or not re.fullmatch(r".+:\d{1,5}", value) or int(value.rpartition(":")[2]) > 0xFFFF:
         raise Wrong('not an address and a port, such as "127.0.0.1:1502"')
     return value
+
+
+def _absolute(value: Any) -> str:
+    if not text(value).startswith("/"):
+        raise Wrong('not a path that begins with "/", such as "/run/drivebus/plc"')
+    return text(value)
 
 
 def _dead_man(value: Any) -> float | Literal["off"]:

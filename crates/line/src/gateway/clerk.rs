@@ -1,8 +1,6 @@
 //! Who is at the desk of one connection: asks the line what the client asks, and answers.
 
 use std::collections::BTreeMap;
-use std::io::{ErrorKind, Write as _};
-use std::net::TcpStream;
 use std::sync::{Arc, OnceLock};
 use std::time::SystemTime;
 
@@ -13,11 +11,12 @@ use crate::bus::errand::Errand;
 use crate::bus::workers::Running;
 use crate::gateway::asked::Asked;
 use crate::gateway::audit::Entry;
-use crate::gateway::connection::{Connection, HURRY};
+use crate::gateway::connection::Connection;
 use crate::gateway::desk::{Desk, Failed};
 use crate::gateway::mailbox::{Answered, Found, Mail, Mailbox};
 use crate::gateway::rights::{Judged, Means, Written, request_of};
 use crate::gateway::silence::Silence;
+use crate::gateway::stream::{HURRY, Stream, is_late};
 use crate::gateway::together::Asker;
 use crate::gateway::writing::{Record, Step, Writing, outcome_of};
 use crate::options::CallOptions;
@@ -49,7 +48,7 @@ impl Clerk {
     }
 
     /// Asks and answers until the connection ends; why it does.
-    pub(super) fn work(mut self, stream: &TcpStream, mailbox: &Arc<Mailbox>) -> String {
+    pub(super) fn work(mut self, mailbox: &Arc<Mailbox>) -> String {
         let why = loop {
             let found = mailbox.next(self.next_due());
             if self.waits_for_the_last_alone(mailbox) {
@@ -76,7 +75,7 @@ impl Clerk {
                 self.connection.gone("is silent");
             }
             let mut all = message.into_iter().chain(late.into_iter().map(|(_, message)| message));
-            if let Some(why) = all.find_map(|message| write(stream, &message).err()) {
+            if let Some(why) = all.find_map(|message| write(&*self.connection.stream, &message).err()) {
                 break why;
             }
         };
@@ -85,7 +84,7 @@ impl Clerk {
         }
         self.connection.gone("has hung up");
         if !why.is_empty() {
-            self.connection.common.counts.cut_off(self.connection.peer, &why);
+            self.connection.common.counts.cut_off(&self.connection.name, &why);
         }
         why
     }
@@ -128,7 +127,7 @@ impl Clerk {
             common.counts.given_up();
             return None;
         }
-        let judged = common.rights.judge(self.connection.peer.ip(), asked.unit, &asked.pdu);
+        let judged = common.rights.judge(self.connection.host, asked.unit, &asked.pdu);
         match judged {
             Judged::Wrong(code) => return Some(self.desk.refused(asked, code)),
             Judged::Refused(why) => return Some(self.refuse(asked, &why)),
@@ -157,7 +156,7 @@ impl Clerk {
     }
 
     fn refuse(&self, asked: &Asked, why: &str) -> Vec<u8> {
-        self.connection.common.counts.refused(self.connection.peer, why, asked);
+        self.connection.common.counts.refused(&self.connection.name, why, asked);
         self.desk.refused(asked, ExceptionCode::ILLEGAL_FUNCTION)
     }
 
@@ -321,7 +320,7 @@ impl Clerk {
                     self.go_on(number, mailbox)
                 }
                 Ok(_) => {
-                    common.counts.another(self.connection.peer, writing.unit);
+                    common.counts.another(&self.connection.name, writing.unit);
                     self.not_sent(number, Failed::before(ExceptionCode::GATEWAY_TARGET_SILENT))
                 }
                 Err(failed) => self.not_sent(number, failed),
@@ -351,12 +350,13 @@ impl Clerk {
 }
 
 /// Writes `message`; the error is why the connection ends.
-fn write(mut stream: &TcpStream, message: &[u8]) -> Result<(), String> {
-    stream.write_all(message).map_err(|error| match error.kind() {
-        ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+fn write(stream: &dyn Stream, message: &[u8]) -> Result<(), String> {
+    stream.write(message).map_err(|error| {
+        // Otherwise it has hung up.
+        if is_late(&error) {
             format!("an answer that was not taken within {} s", HURRY.as_secs())
+        } else {
+            String::new()
         }
-        // It has hung up.
-        _ => String::new(),
     })
 }

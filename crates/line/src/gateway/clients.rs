@@ -1,15 +1,12 @@
 //! Who is connected, how many may be, and who gives way to one more.
 
-use std::net::{IpAddr, Shutdown, TcpStream};
+use std::net::IpAddr;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use drivebus_rtu::Instant;
 
-use crate::system::inherited::Kept;
-
-/// A connection that a forked child does not keep open.
-pub(super) type Stream = Arc<Kept<TcpStream>>;
+use crate::gateway::stream::Stream;
 
 /// Connections at a time, of all and of one host.
 const MOST: usize = 64;
@@ -22,7 +19,7 @@ struct Client {
     host: IpAddr,
     /// When it asked last, or came.
     asked: Instant,
-    stream: Stream,
+    stream: Arc<dyn Stream>,
 }
 
 /// Who is connected.
@@ -48,7 +45,12 @@ impl Clients {
 
     /// Lets the other end of `stream` in. Where no more may be, the one that has not asked for the longest gives way,
     /// which is told; `None`: nobody comes in any more.
-    pub(super) fn enter(self: &Arc<Self>, stream: Stream, host: IpAddr, now: Instant) -> Option<(Place, bool)> {
+    pub(super) fn enter(
+        self: &Arc<Self>,
+        stream: Arc<dyn Stream>,
+        host: IpAddr,
+        now: Instant,
+    ) -> Option<(Place, bool)> {
         let mut inside = self.lock();
         if inside.is_closed {
             return None;
@@ -57,7 +59,7 @@ impl Clients {
         let gone = gives_way(&hosts, host).map(|place| inside.clients.remove(place));
         if let Some(gone) = &gone {
             // Its own threads see that, and end.
-            let _ = gone.stream.shutdown(Shutdown::Both);
+            gone.stream.end();
         }
         inside.numbers += 1;
         inside.open += 1;
@@ -75,7 +77,7 @@ impl Clients {
         let mut inside = self.lock();
         inside.is_closed = true;
         for client in &inside.clients {
-            let _ = client.stream.shutdown(Shutdown::Both);
+            client.stream.end();
         }
         let _ = self.left.wait_timeout_while(inside, within, |inside| inside.open > 0);
     }

@@ -1,25 +1,23 @@
 //! One connection: whose it is, and what it has to do with all others.
 
-use std::net::SocketAddr;
+use std::net::IpAddr;
 use std::sync::Arc;
-use std::time::Duration;
 
 use crate::bus::programs::Seat;
-use crate::gateway::clients::{Place, Stream};
+use crate::gateway::clients::Place;
 use crate::gateway::common::{Common, WillsOf};
-
-/// How long a request may take to come whole, and a client to take an answer.
-pub(super) const HURRY: Duration = Duration::from_secs(1);
+use crate::gateway::stream::Stream;
 
 /// What both threads of a connection have.
 pub(super) struct Connection {
     pub(super) common: Arc<Common>,
     pub(super) seat: Seat,
-    pub(super) peer: SocketAddr,
-    /// The same in words.
+    /// Where its client is.
+    pub(super) host: IpAddr,
+    /// Who that is, for people.
     pub(super) name: String,
     pub(super) place: Place,
-    pub(super) stream: Stream,
+    pub(super) stream: Arc<dyn Stream>,
 }
 
 impl Connection {

@@ -1,7 +1,6 @@
 //! What happened at a gateway: counted, and told in words.
 
 use std::collections::VecDeque;
-use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -78,12 +77,12 @@ impl Counts {
         count(&self.let_in);
     }
 
-    pub(super) fn cut_off(&self, peer: SocketAddr, why: &str) {
+    pub(super) fn cut_off(&self, client: &str, why: &str) {
         count(&self.cut_off);
-        self.tell(format!("{peer} was cut off: {why}"));
+        self.tell(format!("{client} was cut off: {why}"));
     }
 
-    pub(super) fn gave_way(&self, to: SocketAddr) {
+    pub(super) fn gave_way(&self, to: &str) {
         count(&self.gave_way);
         self.tell(format!("as many clients are connected as may: one that asked nothing gave way to {to}"));
     }
@@ -97,16 +96,18 @@ impl Counts {
     }
 
     /// `why`: what is not allowed.
-    pub(super) fn refused(&self, peer: SocketAddr, why: &str, asked: &Asked) {
+    pub(super) fn refused(&self, client: &str, why: &str, asked: &Asked) {
         count(&self.refused);
         let shown = &asked.pdu[..asked.pdu.len().min(16)];
         let more = if shown.len() < asked.pdu.len() { " …" } else { "" };
-        self.tell(format!("{peer} {why}: refused {}{more}", Hex(shown)));
+        self.tell(format!("{client} {why}: refused {}{more}", Hex(shown)));
     }
 
     /// What is at the address of a unit says that it is another one.
-    pub(super) fn another(&self, peer: SocketAddr, unit: u8) {
-        self.tell(format!("{peer} writes to unit {unit}, and another drive answers at its address: nothing was sent"));
+    pub(super) fn another(&self, client: &str, unit: u8) {
+        self.tell(format!(
+            "{client} writes to unit {unit}, and another drive answers at its address: nothing was sent"
+        ));
     }
 
     /// A write ended.

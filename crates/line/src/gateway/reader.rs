@@ -1,74 +1,64 @@
 //! The two threads of a connection: one that reads what the client asks, and the clerk's.
 
-use std::io::{ErrorKind, Read as _};
-use std::net::{Shutdown, TcpStream};
+use std::io::ErrorKind;
 use std::sync::Arc;
 use std::time::Duration;
 
 use crate::gateway::clerk::Clerk;
-use crate::gateway::connection::{Connection, HURRY};
+use crate::gateway::connection::Connection;
 use crate::gateway::desk::Desk;
 use crate::gateway::mailbox::Mailbox;
 use crate::gateway::requests::Requests;
+use crate::gateway::stream::{HURRY, Stream, is_late};
 use crate::system::clock::monotonic;
 
 /// Requests of one connection on their way to the line.
 pub(super) const IN_FLIGHT: usize = 16;
-/// How long a connection stays open that asks nothing.
-const IDLE: Duration = Duration::from_secs(60);
-/// Bytes of answers that the system keeps for a client which does not read: more than those of all its requests on their way.
-#[cfg(unix)]
-const UNREAD: usize = 16_384;
 /// What is read at a time.
 const CHUNK: usize = 4_096;
 
-/// Serves the other end of `stream` to its end.
+/// Serves the other end of the connection to its end.
 ///
 /// # Errors
 ///
 /// The system's: it gives no thread.
 pub(super) fn serve(connection: Connection) -> std::io::Result<()> {
-    let stream = Arc::clone(&connection.stream);
-    // An answer is one small message, and its client waits for it.
-    stream.set_nodelay(true)?;
-    stream.set_write_timeout(Some(HURRY))?;
-    #[cfg(unix)]
-    rustix::net::sockopt::set_socket_send_buffer_size(&**stream, UNREAD)?;
     let mailbox = Arc::new(Mailbox::default());
-    let reader = Arc::clone(&stream);
+    let (reader, end) = (Arc::clone(&connection.stream), Arc::clone(&connection.stream));
     let letters = Arc::clone(&mailbox);
     let common = Arc::clone(&connection.common);
     std::thread::Builder::new().name("drivebus-tcp-in".to_owned()).spawn(move || {
         common.enter_thread();
-        let why = read(&reader, &letters, Requests::new(common.framing));
+        let why = read(&*reader, &letters, Requests::new(common.framing));
         letters.end(why);
     })?;
-    let (letters, end) = (Arc::clone(&mailbox), Arc::clone(&stream));
+    let letters = Arc::clone(&mailbox);
     let desk = std::thread::Builder::new().name("drivebus-tcp".to_owned());
     let spawned = desk.spawn(move || {
         connection.common.enter_thread();
+        let stream = Arc::clone(&connection.stream);
         let desk = Desk::new(connection.common.within, IN_FLIGHT, connection.common.framing);
-        let why = Clerk::new(connection, desk).work(&stream, &letters);
+        let why = Clerk::new(connection, desk).work(&letters);
         letters.end(why);
         // The reader waits there.
-        let _ = stream.shutdown(Shutdown::Both);
+        stream.end();
     });
     if spawned.is_err() {
         mailbox.end(String::new());
-        let _ = end.shutdown(Shutdown::Both);
+        end.end();
     }
     spawned.map(drop)
 }
 
 /// Reads requests until the connection ends; why it does, for people, empty where the client ended it.
-fn read(stream: &TcpStream, mailbox: &Mailbox, mut requests: Requests) -> String {
+fn read(stream: &dyn Stream, mailbox: &Mailbox, mut requests: Requests) -> String {
     let mut bytes = [0; CHUNK];
     // When what is there began: the request that is not whole, or the time without one.
     let mut since = monotonic();
     loop {
-        let limit = if requests.has_begun() { HURRY } else { IDLE };
+        let limit = if requests.has_begun() { HURRY } else { stream.idle().unwrap_or(Duration::MAX) };
         let left = (since + limit).saturating_duration_since(monotonic());
-        let came = if left.is_zero() { Err(ErrorKind::TimedOut.into()) } else { read_within(stream, left, &mut bytes) };
+        let came = if left.is_zero() { Err(ErrorKind::TimedOut.into()) } else { stream.read(&mut bytes, left) };
         match came {
             Ok(0) => return String::new(),
             Ok(count) => {
@@ -91,24 +81,18 @@ fn read(stream: &TcpStream, mailbox: &Mailbox, mut requests: Requests) -> String
                     since = monotonic();
                 }
             }
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+            Err(error) if is_late(&error) => {
                 if monotonic() < since + limit {
                     continue;
                 }
                 return if requests.has_begun() {
                     format!("a request that was not whole within {} s", HURRY.as_secs())
                 } else {
-                    format!("no request for {} s", IDLE.as_secs())
+                    format!("no request for {} s", limit.as_secs())
                 };
             }
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(_) => return String::new(),
         }
     }
-}
-
-fn read_within(mut stream: &TcpStream, left: Duration, bytes: &mut [u8]) -> std::io::Result<usize> {
-    // The system takes no time-out below its own grain.
-    stream.set_read_timeout(Some(left.max(Duration::from_millis(1))))?;
-    stream.read(bytes)
 }

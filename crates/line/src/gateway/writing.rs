@@ -1,6 +1,5 @@
 //! One write of a client: what is asked before it goes out, whether it still may, and what is kept of it.
 
-use std::net::TcpStream;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -8,10 +7,10 @@ use drivebus_rtu::{Destination, Instant};
 
 use crate::bus::workers::Running;
 use crate::gateway::audit::{Entry, Outcome};
-use crate::gateway::clients::Stream;
 use crate::gateway::common::Common;
 use crate::gateway::desk::Failed;
 use crate::gateway::rights::Means;
+use crate::gateway::stream::Stream;
 use crate::system::clock::monotonic;
 
 /// What is next of a write.
@@ -95,20 +94,20 @@ pub(super) struct Record {
     common: Arc<Common>,
     client: u64,
     due: Instant,
-    stream: Stream,
+    stream: Arc<dyn Stream>,
     state: AtomicU8,
     entry: Mutex<Option<Entry>>,
 }
 
 impl Record {
-    pub(super) fn new(common: Arc<Common>, client: u64, due: Instant, stream: Stream, entry: Entry) -> Self {
+    pub(super) fn new(common: Arc<Common>, client: u64, due: Instant, stream: Arc<dyn Stream>, entry: Entry) -> Self {
         Self { common, client, due, stream, state: AtomicU8::new(WAITS), entry: Mutex::new(Some(entry)) }
     }
 
     /// Its turn has come: whether it goes out. One that is too old does not, nor one whose client has hung up.
     pub(super) fn begins(&self) -> bool {
         monotonic() < self.due
-            && !has_hung_up(&self.stream)
+            && !self.stream.has_hung_up()
             && self.state.compare_exchange(WAITS, BEGUN, Ordering::AcqRel, Ordering::Acquire).is_ok()
     }
 
@@ -152,21 +151,4 @@ pub(super) fn outcome_of(result: Result<&Vec<u8>, &Failed>, to: Destination) -> 
         (Err(failed), _) if failed.is_by_unit => Outcome::Refused(failed.code.0),
         _ => Outcome::NotSent,
     }
-}
-
-/// Whether the other end sends nothing any more, though what it sent is not all read.
-#[cfg(target_os = "linux")]
-fn has_hung_up(stream: &TcpStream) -> bool {
-    use rustix::event::{PollFd, PollFlags, Timespec, poll};
-
-    let ended = PollFlags::RDHUP | PollFlags::HUP | PollFlags::ERR;
-    let mut watched = [PollFd::new(stream, ended)];
-    let now = Timespec { tv_sec: 0, tv_nsec: 0 };
-    poll(&mut watched, Some(&now)).is_ok_and(|_| watched[0].revents().intersects(ended))
-}
-
-/// Elsewhere it is seen by who reads what it sends.
-#[cfg(not(target_os = "linux"))]
-fn has_hung_up(_stream: &TcpStream) -> bool {
-    false
 }

@@ -1,9 +1,10 @@
-"""`drivebus share`: lets programs that speak Modbus TCP read a line, beside this and other programs."""
+"""`drivebus share`: lets programs that speak Modbus TCP, or know serial ports alone, read a line beside others."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from time import monotonic
 from typing import Literal
 
@@ -13,6 +14,7 @@ import drivebus
 from drivebus.cli.option_types import Seconds
 from drivebus.cli.present.output import counted, remark
 from drivebus.cli.session import Session, pass_session
+from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["COMMANDS"]
 
@@ -25,7 +27,8 @@ _AT_ONCE = 5
 
 @click.command()
 @click.argument("port", required=False)
-@click.option("--tcp", "address", metavar="HOST:PORT", required=True, help="Where to listen, such as 127.0.0.1:1502.")
+@click.option("--tcp", "address", metavar="HOST:PORT", help="Where to listen, such as 127.0.0.1:1502.")
+@click.option("--pty", metavar="PATH", help="Instead, make a serial port there for a program that knows no other.")
 @click.option("--rtu", is_flag=True, help="Clients speak RTU over TCP, instead of Modbus TCP.")
 @click.option(
     "--answer-within",
@@ -38,19 +41,29 @@ _AT_ONCE = 5
 @click.option("--for", "duration", type=Seconds(0), metavar="SECONDS", help="Stop after so long.")
 @pass_session
 def share(
-    session: Session, port: str | None, address: str, rtu: bool, answer_within: float, duration: float | None
+    session: Session,
+    port: str | None,
+    address: str | None,
+    pty: str | None,
+    rtu: bool,
+    answer_within: float,
+    duration: float | None,
 ) -> None:
     """Let programs that speak Modbus TCP read the line, until Ctrl-C.
 
     They read, and nothing else: whatever may write is refused. Other drivebus commands use the port meanwhile, and a
     `drivebus stop` goes before all of them. Everybody who can reach HOST:PORT can read.
     """
+    if (address is None) == (pty is None):
+        raise WrongUse("give --tcp HOST:PORT, or --pty PATH")
     session = session if port is None else replace(session, port=port)
     framing: Literal["tcp", "rtu"] = "rtu" if rtu else "tcp"
     with (
         # So that a read is asked again within the time that its client waits.
         session.bus(learn_timeout=True) as bus,
-        drivebus.Gateway(bus, address, framing=framing, answer_within=answer_within) as gateway,
+        drivebus.Gateway(
+            bus, address or Path.cwd() / (pty or ""), framing=framing, answer_within=answer_within
+        ) as gateway,
     ):
         with suppress(KeyboardInterrupt):
             session.out.record({"address": gateway.address, "port": bus.port})
