@@ -182,11 +182,15 @@ def test_its_end_halts_what_clients_set_in_motion(tmp_path: Path, number: int) -
             assert ask(client, RUN) == RUN
             program.send_signal(number)
             assert program.wait() == 0
+            assert program.stderr is not None
+            told_last = program.stderr.read()
+            assert "is cut off as the gateway closes: the motor is halted" in told_last
+            assert "unit 1 took the halt" in told_last
         seen(lambda: simulator.drive(1).state == "stopped")
         assert [write[1:] for write in simulator.drive(1).take_writes()] == [(0x2000, 1), (0x2000, 5)]
         assert not list((tmp_path / "run").glob("serve-*"))
         told = [json.loads(line) for line in (tmp_path / "audit.jsonl").read_text().splitlines()]
-        assert [line.get("outcome") for line in told] == ["done", None]
+        assert [line.get("outcome") or line["halted"] for line in told] == ["done", "is cut off as the gateway closes"]
 
 
 @NO_PTY

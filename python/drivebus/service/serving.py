@@ -132,7 +132,10 @@ class _Served:
     def _try(self) -> None:
         try:
             with ExitStack() as stack:
-                self._begin(stack)
+                gateways: list[Gateway] = []
+                # Last of all: what becomes of motors at the end is told, too.
+                stack.callback(self._tell_of, gateways)
+                self._begin(stack, gateways)
                 stack.callback(self._close)
                 self.tried.set()
                 self._serve()
@@ -144,7 +147,7 @@ class _Served:
             self.tried.set()
             self._over.wait(_AGAIN)
 
-    def _begin(self, stack: ExitStack) -> None:
+    def _begin(self, stack: ExitStack, gateways: list[Gateway]) -> None:
         line = self._line
         share = self._site.share
         # So that a read is asked again within the time that its client waits.
@@ -158,7 +161,7 @@ class _Served:
         if line.rs485 is not None:
             options["rs485"] = {"mode": line.rs485}
         bus = stack.enter_context(Bus(line.port, **options))
-        gateways = [stack.enter_context(self._gateway(bus, each)) for each in self._told]
+        gateways.extend(stack.enter_context(self._gateway(bus, each)) for each in self._told)
         self._open, self._why = (bus, gateways), ""
         at = ", ".join(gateway.address for gateway in gateways)
         self._tell(f"{self.name}: {bus.port} is served{f' at {at}' if at else ''}")
@@ -186,11 +189,7 @@ class _Served:
         known: list[str] = []
         while not self._over.is_set():
             self._over.wait(_LOOKS)
-            told = [text for gateway in gateways for text in gateway.told()]
-            for text in told[:_AT_ONCE]:
-                self._tell(f"{self.name}: {text}")
-            if len(told) > _AT_ONCE:
-                self._tell(f"{self.name}: and {len(told) - _AT_ONCE} more like these")
+            self._tell_of(gateways)
             stats = bus.stats()
             notes = [*stats.notes, *stats.wills]
             for text in notes:
@@ -201,6 +200,13 @@ class _Served:
             with suppress(DrivebusError):
                 bus.listen(0.0)
             self.turns += 1
+
+    def _tell_of(self, gateways: list[Gateway]) -> None:
+        told = [text for gateway in gateways for text in gateway.told()]
+        for text in told[:_AT_ONCE]:
+            self._tell(f"{self.name}: {text}")
+        if len(told) > _AT_ONCE:
+            self._tell(f"{self.name}: and {len(told) - _AT_ONCE} more like these")
 
     def status(self) -> dict[str, Any]:
         """How the line does."""

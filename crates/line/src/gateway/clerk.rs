@@ -82,7 +82,8 @@ impl Clerk {
         for way in self.on_their_way.values() {
             self.take_back(way);
         }
-        self.connection.gone("has hung up");
+        let is_closed = self.connection.place.is_closed();
+        self.connection.gone(if is_closed { "is cut off as the gateway closes" } else { "has hung up" });
         if !why.is_empty() {
             self.connection.common.counts.cut_off(&self.connection.name, &why);
         }

@@ -98,6 +98,11 @@ impl Place {
             client.asked = now;
         }
     }
+
+    /// Whether all connections are ended: it is no longer the client's doing that this one is.
+    pub(super) fn is_closed(&self) -> bool {
+        self.clients.lock().is_closed
+    }
 }
 
 impl Drop for Place {
