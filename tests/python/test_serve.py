@@ -313,6 +313,24 @@ def test_the_unit_of_the_manual(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+def test_what_the_unit_of_the_manual_starts_again(tmp_path: Path) -> None:
+    """However often, and not for a mistake in the file. systemd knows a kind of port once its module is loaded."""
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "service.md").read_text()
+    unit = page.partition("```ini\n")[2].partition("```")[0].splitlines()
+    assert "Restart=always" in unit
+    assert "StartLimitIntervalSec=0" in unit[: unit.index("[Service]")]
+    assert str(serve(tmp_path / "none.toml").returncode) in said(unit, "RestartPreventExitStatus")
+    modules = {"char-ttyUSB": "modprobe@usbserial.service", "char-ttyACM": "modprobe@cdc_acm.service"}
+    kinds = {line.split("=")[1].split()[0] for line in unit if line.startswith("DeviceAllow=")}
+    for module in (modules[kind] for kind in kinds if kind in modules):
+        assert module in said(unit, "After")
+        assert module in said(unit, "Wants")
+
+
+def said(unit: list[str], key: str) -> list[str]:
+    return [word for line in unit if line.startswith(f"{key}=") for word in line.partition("=")[2].split()]
+
+
 def test_the_file_of_the_manual(tmp_path: Path) -> None:
     page = (Path(__file__).parents[2] / "docs" / "reference" / "service.md").read_text()
     file = tmp_path / "drivebus.toml"
