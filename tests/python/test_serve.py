@@ -18,6 +18,7 @@ import minimalmodbus
 import pytest
 
 from drivebus import Simulator
+from drivebus.spool import Spool
 
 from .conftest import NO_PTY
 from .tcp_client import answer, request, seen
@@ -250,6 +251,87 @@ def test_its_status(tmp_path: Path) -> None:
             assert f"client 127.0.0.1:{client.getsockname()[1]}, 1 request, 1 answered" in shown
             assert f"{file.parent}/plc, 0 clients, 0 requests" in shown
             assert re.search(r"hall: \S+, \d+% occupied, \d+ requests", shown)
+
+
+POLLED = """
+[[poll]]
+drives = ["pump1"]
+interval = 0.02
+heartbeat = 1
+
+[[poll]]
+drives = ["pump1", "ghost"]
+registers = ["running_frequency"]
+interval = 0.5
+
+[poll.band]
+running_frequency = 20
+
+[drives.ghost]
+line = "hall"
+unit = 9
+profile = "gd350"
+"""
+
+
+@NO_PTY
+def test_what_drives_say_waits_in_the_spool(tmp_path: Path) -> None:
+    """Also while a client runs the motor; what is not new stays out, and a drive that is away is told."""
+    with plant(tmp_path) as (_, file, tcp, environment):
+        file.write_text(file.read_text() + POLLED)
+        checked = serve(file, "--check", env=environment).stdout
+        assert re.search(r"the spool holds \d+ hours of samples", checked)
+        with (
+            service(file, environment),
+            socket.create_connection(("127.0.0.1", tcp), timeout=20) as client,
+        ):
+            assert ask(client, RUN) == RUN
+            shown = ""
+
+            def has_enough() -> bool:
+                nonlocal shown
+                shown = serve(file, "--status", env=environment).stdout
+                samples = re.search(r"spool: (\d+) samples, 0 lost", shown)
+                return samples is not None and int(samples[1]) > 60
+
+            seen(has_enough)
+            assert re.search(r"pump1, asked \d+\.\d s ago\n", shown)
+            assert re.search(r"ghost, asked \d+\.\d s ago: unit 9, read", shown)
+        with Spool(tmp_path / "drivebus-spool", 1 << 30, print) as spool:
+            samples = spool.reader("test").after(0, 10_000)
+        monitor = [each for each in samples if len(each.layout.names) > 1]
+        frequency = [each.values[0] for each in samples if each.layout.names == ("running_frequency",) and each.values]
+        speed = monitor[0].layout.names.index("running_frequency")
+        assert [each.values[speed] for each in monitor] == sorted(each.values[speed] for each in monitor)
+        assert len({each.values[speed] for each in monitor}) > 20
+        assert 1 <= len(frequency) <= 4
+        gone = [each for each in samples if each.layout.drive == "ghost"]
+        assert gone
+        assert all(each.missing.startswith("unit 9, read") and not each.values for each in gone)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "said"),
+    [
+        ('drives = ["pump1"]\ninterval', 'drives = ["pump7"]\ninterval', 2, 'there is no drive or group "pump7"'),
+        ('drives = ["pump1"]\ninterval', 'drives = ["pumps"]\ninterval', 2, '"pump2" has no profile'),
+        ("interval = 0.02", "interval = 0", 3, "not a number from 0.01"),
+        ("heartbeat = 1", "beat = 1", 4, '"beat" is not known here'),
+        ('["running_frequency"]', '["runing_frequency"]', 8, 'the closest is "running_frequency"'),
+        ("running_frequency = 20", "output_current = 1", 11, "is not asked for output_current, which has a band"),
+        ("running_frequency = 20", "running_frequency = -1", 11, "not a number from 0 to"),
+        ("[[poll]]\ndrives", "[spool]\nsize_mb = 1\n[[poll]]\ndrives", 2, "not a whole number from 10"),
+    ],
+)
+def test_a_mistake_in_a_poll(tmp_path: Path, old: str, new: str, line: int, said: str) -> None:
+    file = file_of(tmp_path)
+    before = file.read_text()
+    assert old in POLLED
+    file.write_text(before + POLLED.replace(old, new, 1))
+    done = serve(file, "--check")
+    assert done.returncode == 2
+    at = before.count("\n") + 1 + line
+    assert any(told.startswith(f"{file}:{at}: ") and said in told for told in done.stderr.splitlines()), done.stderr
 
 
 @NO_PTY

@@ -1,4 +1,4 @@
-"""What is wrong in what a site says of sharing, beyond its form: registers and commands, by the families of the drives.
+"""What is wrong in what a site says, beyond its form: registers and commands, by the families of the drives.
 
 Nothing is opened, and nothing is sent.
 """
@@ -7,27 +7,44 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from drivebus import checks
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.operations import network_rights
 from drivebus.operations.last_will import WAYS
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
-from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway
+from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SitePoll
 
-__all__ = ["check"]
+__all__ = ["check", "hours_of"]
+
+_BYTES, _BYTES_A_VALUE = 34, 4
+"""Of a sample in the spool, as it was measured."""
 
 
 def check(site: Site) -> None:
-    """Looks through what *site* says of clients over the network.
+    """Looks through what *site* says of clients and of polls.
 
     Raises:
         NotAllowed: Something cannot be; each mistake is named with its line.
     """
     wrong = {mistake for gateway in site.share.gateways for mistake in _of_gateway(gateway)}
+    wrong |= {mistake for poll in site.polls for mistake in _of_poll(poll)}
     if wrong:
         count = "one mistake" if len(wrong) == 1 else f"{len(wrong)} mistakes"
         told = [f"{site.path}:{line}: {reason}" for line, reason in sorted(wrong)]
         raise BadArgument("\n".join([f"{site.path} has {count}; nothing was opened:", *told]))
+
+
+def hours_of(site: Site) -> float | None:
+    """How many hours of samples the spool holds, if each is kept; None where nothing is polled."""
+    if not site.polls or site.spool is None:
+        return None
+    each_second = 0.0
+    for poll in site.polls:
+        for drive in poll.drives:
+            values = len(poll.registers) or len(_profile_of(drive).monitor_names())
+            each_second += (_BYTES + _BYTES_A_VALUE * values) / poll.interval
+    return site.spool.size / each_second / 3600 if each_second else None
 
 
 def _of_gateway(gateway: SiteGateway) -> Iterator[tuple[int, str]]:
@@ -61,6 +78,34 @@ def _of_rule(allow: SiteAllow, moved: list[str]) -> Iterator[tuple[int, str]]:
             yield from _of_drive(allow, drive, moved)
 
 
+def _of_poll(poll: SitePoll) -> Iterator[tuple[int, str]]:
+    at = poll.lines.get("drives", poll.lines[""])
+    for drive in poll.drives:
+        if drive.profile is None:
+            yield at, f'"{drive.name}" has no profile, and a poll needs one: say it in [drives.{drive.name}]'
+            continue
+        try:
+            profile = _profile_of(drive)
+        except NotAllowed as error:
+            yield at, f'"{drive.name}": {error}'
+            continue
+        try:
+            Evidence(profile, drive.unit, drive.unverified).require_readable(poll.registers)
+        except NotAllowed as error:
+            yield poll.lines["registers"], f'"{drive.name}": {error}'
+        else:
+            asked = poll.registers or profile.monitor_names()
+            for name in poll.band:
+                if name not in asked:
+                    hint = checks.closest(name, asked)
+                    yield poll.lines["band"], f'"{drive.name}" is not asked for {name}, which has a band{hint}'
+
+
+def _profile_of(drive: SiteDrive) -> Profile:
+    profile = Profile.find(drive.profile or "")
+    return profile.with_variants(drive.variants) if drive.variants else profile
+
+
 def _of_drive(allow: SiteAllow, drive: SiteDrive, moved: list[str]) -> Iterator[tuple[int, str]]:
     at = allow.lines["drives"]
     if drive.profile is None:
@@ -70,8 +115,7 @@ def _of_drive(allow: SiteAllow, drive: SiteDrive, moved: list[str]) -> Iterator[
         yield at, f'"{drive.name}" is read_only'
         return
     try:
-        profile = Profile.find(drive.profile)
-        profile = profile.with_variants(drive.variants) if drive.variants else profile
+        profile = _profile_of(drive)
     except NotAllowed as error:
         yield at, f'"{drive.name}": {error}'
         return

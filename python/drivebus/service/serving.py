@@ -12,13 +12,15 @@ from typing import Any
 
 from drivebus.bus import Bus
 from drivebus.drive import Drive
-from drivebus.errors import DrivebusError
+from drivebus.errors import DrivebusError, NotAllowed
 from drivebus.gateway import Allow, Gateway, GatewayStats
 from drivebus.latch import Latch
 from drivebus.service.check import check
 from drivebus.service.notify import notify, watchdog_interval
+from drivebus.service.polling import Polling
 from drivebus.service.status import StatusFile
 from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SiteLine
+from drivebus.spool import Spool
 
 __all__ = ["Service"]
 
@@ -51,7 +53,10 @@ class Service:
         of_line = {
             name: [each for each in site.share.gateways if each.line == line] for name, line in site.lines.items()
         }
-        self._lines = [_Served(site, line, of_line[name], tell, self._over) for name, line in site.lines.items()]
+        self._spool = _spool_of(site, tell)
+        self._lines = [
+            _Served(site, line, of_line[name], tell, self._over, self._spool) for name, line in site.lines.items()
+        ]
 
     def run(self, duration: float | None = None) -> None:
         """Serves until `end` is called, or for *duration* seconds. What clients set in motion is halted then."""
@@ -69,6 +74,8 @@ class Service:
             self._over.set()
             for thread in threads:
                 thread.join()
+            if self._spool is not None:
+                self._spool.close()
             with suppress(OSError):
                 status.remove()
 
@@ -99,6 +106,7 @@ class Service:
             "process": os.getpid(),
             "file": str(self._site.path),
             "lines": {line.name: line.status() for line in self._lines},
+            "spool": None if self._spool is None else {"last": self._spool.last, "lost": self._spool.lost},
         }
 
 
@@ -106,7 +114,13 @@ class _Served:
     """One line, opened again and again until the service ends."""
 
     def __init__(
-        self, site: Site, line: SiteLine, gateways: list[SiteGateway], tell: Callable[[str], None], over: Latch
+        self,
+        site: Site,
+        line: SiteLine,
+        gateways: list[SiteGateway],
+        tell: Callable[[str], None],
+        over: Latch,
+        spool: Spool | None,
     ) -> None:
         self.name = line.name
         self.turns = 0
@@ -114,6 +128,7 @@ class _Served:
         self.tried = Latch()
         """Closed when it was tried to open it."""
         self._site, self._line, self._told = site, line, gateways
+        self._polling = Polling(line, site.polls, spool)
         self._tell = tell
         self._over = over
         self._open: tuple[Bus, list[Gateway]] | None = None
@@ -162,6 +177,7 @@ class _Served:
             options["rs485"] = {"mode": line.rs485}
         bus = stack.enter_context(Bus(line.port, **options))
         gateways.extend(stack.enter_context(self._gateway(bus, each)) for each in self._told)
+        self._polling.begin(bus, stack)
         self._open, self._why = (bus, gateways), ""
         at = ", ".join(gateway.address for gateway in gateways)
         self._tell(f"{self.name}: {bus.port} is served{f' at {at}' if at else ''}")
@@ -196,6 +212,7 @@ class _Served:
                 if text not in known:
                     self._tell(f"{self.name}: {text}")
             known = notes
+            self._polling.check()
             # Nothing is sent: whoever uses the line lets this one have its turn, or hangs.
             with suppress(DrivebusError):
                 bus.listen(0.0)
@@ -226,12 +243,23 @@ class _Served:
             "timeouts": stats.timeouts,
             "reconnects": stats.reconnects,
             "hints": stats.hints,
+            "drives": self._polling.status(),
             "programs": [program for program in stats.programs if program["here"]],
             "gateways": {
                 gateway.address: dict(zip(GatewayStats.__annotations__, gateway.stats, strict=True))
                 for gateway in gateways
             },
         }
+
+
+def _spool_of(site: Site, tell: Callable[[str], None]) -> Spool | None:
+    """Where samples wait, if there are any."""
+    if not site.polls or site.spool is None:
+        return None
+    try:
+        return Spool(site.spool.path, site.spool.size, tell)
+    except OSError as error:
+        raise NotAllowed(f"the spool {site.spool.path} cannot be opened: {error.strerror or error}") from None
 
 
 def _allowed(bus: Bus, rule: SiteAllow, drives: dict[str, Drive]) -> Allow:

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from drivebus.site.config import FILE, Site
     from drivebus.site.entries import SiteDrive, SiteLine
     from drivebus.site.known_families import families_on, forget, known_family, remember
+    from drivebus.site.polls import SitePoll, SiteSpool
     from drivebus.site.share import SiteAllow, SiteGateway, SiteShare
     from drivebus.site.state_folder import state_file
 
@@ -18,7 +19,9 @@ __all__ = [
     "SiteDrive",
     "SiteGateway",
     "SiteLine",
+    "SitePoll",
     "SiteShare",
+    "SiteSpool",
     "families_on",
     "forget",
     "known_family",
@@ -33,6 +36,7 @@ if not TYPE_CHECKING:
             "config": ("FILE", "Site"),
             "entries": ("SiteDrive", "SiteLine"),
             "known_families": ("families_on", "forget", "known_family", "remember"),
+            "polls": ("SitePoll", "SiteSpool"),
             "share": ("SiteAllow", "SiteShare", "SiteGateway"),
             "state_folder": ("state_file",),
         },

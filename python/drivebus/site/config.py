@@ -29,6 +29,7 @@ from drivebus.advice import Text
 from drivebus.errors import BadArgument
 from drivebus.line.addresses import Addresses
 from drivebus.site.entries import SiteDrive, SiteLine
+from drivebus.site.polls import SitePoll, SiteSpool, polls_of, spool_of
 from drivebus.site.reading import Reading, Wrong, flag, one_of, quoted, text, texts, whole
 from drivebus.site.share import SiteShare, share_of
 
@@ -52,6 +53,8 @@ class Site:
         drives: Drives by name.
         groups: Drives of each group, by its name.
         share: Who may use the lines, beside the programs of one user.
+        polls: What a service asks the drives again and again.
+        spool: Where it keeps what they say until others have it.
     """
 
     path: Path
@@ -59,6 +62,8 @@ class Site:
     drives: Mapping[str, SiteDrive]
     groups: Mapping[str, tuple[SiteDrive, ...]]
     share: SiteShare = field(default_factory=SiteShare)
+    polls: tuple[SitePoll, ...] = ()
+    spool: SiteSpool | None = None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Site:
@@ -104,7 +109,7 @@ class _Reader:
 
     def site(self) -> Site:
         """What the file says, or all that is wrong in it."""
-        self._file.check_keys(self._file.data, ("lines", "drives", "groups", "share"), ())
+        self._file.check_keys(self._file.data, ("lines", "drives", "groups", "share", "poll", "spool"), ())
         lines = {name: line for name, line in self._tables("lines", self._line) if line is not None}
         drives = {
             name: drive
@@ -113,8 +118,9 @@ class _Reader:
         }
         groups = self._groups(drives)
         share = share_of(self._file, lines, drives, groups)
+        polls, spool = polls_of(self._file, drives, groups), spool_of(self._file)
         self._file.finish()
-        return Site(self._file.path, lines, drives, groups, share)
+        return Site(self._file.path, lines, drives, groups, share, polls, spool)
 
     def _tables(self, section: str, read: Callable[[str, dict[str, Any]], Any]) -> Iterator[tuple[str, Any]]:
         """Each table in *section*, as *read* makes it."""

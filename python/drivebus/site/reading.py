@@ -83,6 +83,16 @@ class Reading:
                 hint = checks.closest(key, allowed)
                 self.complain((*where, key), f'"{key}" is not known here{hint}; allowed is {quoted(allowed)}')
 
+    def tables(self, table: Mapping[str, Any], where: Key) -> list[tuple[Key, dict[str, Any]]]:
+        """The tables of the list at *where*, which is in *table*, each with where it stands itself."""
+        name = str(where[-1])
+        found = table.get(name, [])
+        if not isinstance(found, list) or not all(isinstance(each, dict) for each in found):
+            dotted = ".".join(str(each) for each in where if isinstance(each, str))
+            self.complain(where, f"{name} is a list of tables: [[{dotted}]]")
+            return []
+        return [((*where, place), each) for place, each in enumerate(found)]
+
     def complain(self, where: Key, reason: str) -> None:
         """What stands at *where* is wrong, for *reason*."""
         self._wrong.append((self.line_of(where), reason))

@@ -117,21 +117,10 @@ def share_of(
     audit = file.value(("share",), table, "audit", text)
     realtime = file.value(("share",), table, "realtime", flag) or False
     reader = _Gateways(file, lines, drives, groups)
-    tcp = _tables(file, table, ("share", "tcp"), reader.tcp)
-    pty = _tables(file, table, ("share", "pty"), reader.pty)
+    tcp = [reader.tcp(each, where) for where, each in file.tables(table, ("share", "tcp"))]
+    pty = [reader.pty(each, where) for where, each in file.tables(table, ("share", "pty"))]
     gateways = tuple(each for each in [*tcp, *pty] if each is not None)
     return SiteShare(group, None if audit is None else file.path.parent / audit, realtime, gateways)
-
-
-def _tables(file: Reading, table: Mapping[str, Any], where: Key, read: Any) -> list[Any]:
-    """Each table of the list at *where*, as *read* makes it."""
-    name = where[-1]
-    found = table.get(str(name), [])
-    if not isinstance(found, list) or not all(isinstance(each, dict) for each in found):
-        dotted = ".".join(str(each) for each in where if isinstance(each, str))
-        file.complain(where, f"{name} is a list of tables: [[{dotted}]]")
-        return []
-    return [read(each, (*where, place)) for place, each in enumerate(found)]
 
 
 @dataclass(frozen=True)
@@ -171,7 +160,7 @@ class _Gateways:
         if name is not None and line is None:
             hint = checks.closest(name, self.lines)
             file.complain((*where, "line"), f'there is no line "{name}"{hint}; there are {quoted(self.lines)}')
-        allow = _tables(file, table, (*where, "allow"), lambda each, there: self._allow(each, there, line, rule))
+        allow = [self._allow(each, there, line, rule) for there, each in file.tables(table, (*where, "allow"))]
         if line is None or address is None:
             return None
         return SiteGateway(line, address, framing, within or 1.0, dead_man, tuple(allow), file.line_of(where))

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
+
+from drivebus.spool.layout import Layout
+from drivebus.spool.proof import is_proven
 
 __all__ = ["Aside", "salvage"]
 
-_TABLES = ("epoch", "layout", "sample", "position")
+Row: TypeAlias = "tuple[Any, ...]"
 
 
 class Aside(NamedTuple):
@@ -42,8 +46,8 @@ def salvage(path: Path, schema: str) -> Aside:
     path.touch(0o600)
     with closing(sqlite3.connect(path)) as new, closing(sqlite3.connect(aside)) as old, new:
         new.executescript(schema)
-        for table in _TABLES:
-            for row in _readable(old, table):
+        for table in _IS_WHOLE:
+            for row in filter(_IS_WHOLE[table], _readable(old, table)):
                 marks = ", ".join("?" * len(row))
                 new.execute(f"INSERT OR IGNORE INTO {table} VALUES ({marks})", row)
         # A sample of which nobody can tell what it has is none.
@@ -55,7 +59,7 @@ def salvage(path: Path, schema: str) -> Aside:
     return Aside(aside, saved)
 
 
-def _readable(base: sqlite3.Connection, table: str) -> Iterator[tuple[object, ...]]:
+def _readable(base: sqlite3.Connection, table: str) -> Iterator[Row]:
     """The rows up to the first that cannot be read, and from the last one down to there."""
     for order in ("ASC", "DESC"):
         try:
@@ -63,6 +67,29 @@ def _readable(base: sqlite3.Connection, table: str) -> Iterator[tuple[object, ..
             return
         except sqlite3.DatabaseError:
             continue
+
+
+def _is_epoch(row: Row) -> bool:
+    return bool(re.fullmatch(r"[0-9a-f]{16}", str(row[1])))
+
+
+def _is_layout(row: Row) -> bool:
+    try:
+        return Layout.of_text(row[1]).text() == row[1]
+    except (TypeError, ValueError):
+        return False
+
+
+def _is_position(row: Row) -> bool:
+    return isinstance(row[0], str) and isinstance(row[1], int)
+
+
+_IS_WHOLE: dict[str, Callable[[Row], bool]] = {
+    "epoch": _is_epoch,
+    "layout": _is_layout,
+    "sample": is_proven,
+    "position": _is_position,
+}
 
 
 def _free_name(path: Path) -> Path:

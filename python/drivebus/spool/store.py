@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from drivebus.errors import NotAllowed
 from drivebus.spool.layout import Layout
+from drivebus.spool.proof import is_proven, proof_of
 from drivebus.spool.salvage import salvage
 from drivebus.values import Value
 
@@ -25,7 +26,8 @@ _SCHEMA = """
 CREATE TABLE IF NOT EXISTS epoch (number INTEGER PRIMARY KEY AUTOINCREMENT, name TEXT NOT NULL UNIQUE);
 CREATE TABLE IF NOT EXISTS layout (number INTEGER PRIMARY KEY, told TEXT NOT NULL UNIQUE);
 CREATE TABLE IF NOT EXISTS sample (seq INTEGER PRIMARY KEY AUTOINCREMENT, epoch INTEGER NOT NULL,
-    layout INTEGER NOT NULL, time REAL NOT NULL, took REAL NOT NULL, missing TEXT, packed BLOB);
+    layout INTEGER NOT NULL, time REAL NOT NULL, took REAL NOT NULL, missing TEXT NOT NULL,
+    packed BLOB NOT NULL, proof INTEGER NOT NULL);
 CREATE TABLE IF NOT EXISTS position (sink TEXT PRIMARY KEY, seq INTEGER NOT NULL);
 """
 _COMMITS = 1.0
@@ -184,7 +186,8 @@ class Spool:
             base.execute("BEGIN IMMEDIATE")
             rows = [(self._epoch, self._layout(each.layout), *each[1:]) for each in new]
             base.executemany(
-                "INSERT INTO sample (epoch, layout, time, took, missing, packed) VALUES (?, ?, ?, ?, ?, ?)", rows
+                "INSERT INTO sample (epoch, layout, time, took, missing, packed, proof) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                [(*row, proof_of(*row)) for row in rows],
             )
             base.executemany("INSERT OR REPLACE INTO position VALUES (?, ?)", reached.items())
         [(last,)] = base.execute("SELECT seq FROM sqlite_sequence WHERE name = 'sample'").fetchall() or [(0,)]
@@ -251,11 +254,11 @@ class Reader:
     def after(self, seq: int, limit: int, before: int | None = None) -> list[Spooled]:
         """The first samples behind number *seq*, *limit* at most; and with numbers below *before*."""
         rows = self._base.execute(
-            "SELECT seq, epoch, layout, time, took, missing, packed FROM sample WHERE seq > ? AND seq < ?"
+            "SELECT seq, epoch, layout, time, took, missing, packed, proof FROM sample WHERE seq > ? AND seq < ?"
             " ORDER BY seq LIMIT ?",
             (seq, _NO_NUMBER if before is None else before, limit),
         )
-        return [self._sample(*row) for row in rows.fetchall()]
+        return [self._sample(*row[:-1]) for row in rows.fetchall() if is_proven(row)]
 
     def wait(self, seq: int, timeout: float) -> bool:
         """Waits for a sample behind number *seq*, for *timeout* seconds at most; whether there is one."""

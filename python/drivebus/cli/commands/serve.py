@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 from contextlib import suppress
+from datetime import datetime, timezone
 from types import FrameType
 from typing import Any
 
@@ -43,11 +44,11 @@ def serve(session: Session, context: click.Context, checks: bool, shows: bool, d
         raise WrongUse(f"{site.path} has no lines to serve: name them as [lines.NAME]")
     if checks:
         service.check(site)
-        share = site.share
-        session.out.record({"file": str(site.path), "lines": len(site.lines), "gateways": len(share.gateways)})
-        session.out.say(
-            f"{site.path}: {counted(len(site.lines), 'line')}, {counted(len(share.gateways), 'gateway')}: no mistake"
-        )
+        lines, gateways, hours = len(site.lines), len(site.share.gateways), service.hours_of(site)
+        session.out.record({"file": str(site.path), "lines": lines, "gateways": gateways, "spool_hours": hours})
+        session.out.say(f"{site.path}: {counted(lines, 'line')}, {counted(gateways, 'gateway')}: no mistake")
+        if hours is not None:
+            session.out.say(f"the spool holds {hours:,.0f} hours of samples, or more where values stay the same")
         return
     served = service.Service(site, remark)
 
@@ -63,6 +64,7 @@ def serve(session: Session, context: click.Context, checks: bool, shows: bool, d
 def _show(session: Session, status: dict[str, Any]) -> None:
     session.out.record(status)
     session.out.say(f"process {status['process']}, at {status['time']}")
+    moment = datetime.now(timezone.utc).timestamp()
     for name, line in status["lines"].items():
         if not line["open"]:
             session.out.say(f"{name}: {line['port']} is away: {line['why']}")
@@ -81,8 +83,15 @@ def _show(session: Session, status: dict[str, Any]) -> None:
                 f"{of['answered']} answered, {of['failed']} failed, {of['late']} late, {of['refused']} refused, "
                 f"{of['written']} written, {of['halted']} halted"
             )
+        for drive, asked in line["drives"].items():
+            age = max(moment - asked["time"], 0.0)
+            session.out.say(
+                f"{name}: {drive}, asked {age:.1f} s ago{': ' + asked['missing'] if asked['missing'] else ''}"
+            )
         for hint in line["hints"]:
             session.out.say(f"{name}: {hint}")
+    if status["spool"] is not None:
+        session.out.say(f"spool: {status['spool']['last']} samples, {status['spool']['lost']} lost")
 
 
 COMMANDS = [serve]

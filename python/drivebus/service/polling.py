@@ -1,0 +1,98 @@
+"""What the drives of one line are asked again and again, on its way into the spool."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from contextlib import ExitStack
+from decimal import Decimal
+from functools import partial
+from typing import Any
+
+from drivebus.bus import Bus
+from drivebus.drive import Drive
+from drivebus.line.poll_samples import Sample
+from drivebus.poll import Poll
+from drivebus.service.changes import Changes
+from drivebus.site import SiteDrive, SiteLine, SitePoll
+from drivebus.spool import Layout, Spool
+
+__all__ = ["Polling", "digits_of"]
+
+
+class Polling:
+    """The polls of one line, as often as it is opened.
+
+    Args:
+        line: The line.
+        polls: What is asked, on this line and on others.
+        spool: Where it goes.
+    """
+
+    def __init__(self, line: SiteLine, polls: tuple[SitePoll, ...], spool: Spool | None) -> None:
+        self._polls = [
+            (poll, chosen) for poll in polls if (chosen := [drive for drive in poll.drives if drive.line == line])
+        ]
+        self._spool = spool
+        self._begun: list[Poll[Drive]] = []
+        self._lock = threading.Lock()
+        self._last: dict[str, tuple[float, str]] = {}
+
+    def begin(self, bus: Bus, stack: ExitStack) -> None:
+        """Polls the drives on *bus*, until *stack* is closed.
+
+        Raises:
+            NotAllowed: A name is unknown or may not be read, or the interval is shorter than the line can carry.
+        """
+        self._begun = []
+        for poll, chosen in self._polls:
+            drives = {_handle(bus, each): each.name for each in chosen}
+            names = {drive: list(poll.registers) or drive.readable() for drive in drives}
+            series = {drive: _Series(name, drive, names[drive], poll) for drive, name in drives.items()}
+            begun = bus.poll(names, poll.interval, callback=partial(self._take, series))
+            self._begun.append(stack.enter_context(begun))
+
+    def check(self) -> None:
+        """Raises what ended a poll, if anything did."""
+        for poll in self._begun:
+            poll.wait(0.0)
+
+    def status(self) -> dict[str, dict[str, Any]]:
+        """Of each drive when it was asked last, as Unix time, and why there was no answer."""
+        with self._lock:
+            return {name: {"time": round(at, 3), "missing": missing} for name, (at, missing) in self._last.items()}
+
+    def _take(self, series: Mapping[Drive, _Series], sample: Sample[Drive]) -> None:
+        of = series[sample.key]
+        missing = "" if sample.missing is None else str(sample.missing)
+        # A unit that is silent goes on being silent, whether it was asked or spared.
+        kind = "" if sample.missing is None else type(sample.missing).__name__
+        values = [] if missing else [sample[name] for name in of.layout.names]
+        with self._lock:
+            self._last[of.layout.drive] = (sample.time, missing)
+        if self._spool is not None and of.changes.keeps(sample.time, kind, values):
+            self._spool.add(of.layout, sample.time, sample.answered - sample.time, missing, values)
+
+
+class _Series:
+    """The samples of one drive in one poll."""
+
+    def __init__(self, name: str, drive: Drive, registers: list[str], poll: SitePoll) -> None:
+        rows = [drive.describe(register) for register in registers]
+        self.layout = Layout(
+            name,
+            drive.profile.name,
+            tuple(registers),
+            tuple(row.unit for row in rows),
+            tuple(digits_of(row.scale) for row in rows),
+        )
+        self.changes = Changes([poll.band.get(register, 0.0) for register in registers], poll.heartbeat)
+
+
+def digits_of(scale: float) -> int:
+    """How many digits behind the point a value has that counts in steps of *scale*."""
+    return max(0, -int(Decimal(repr(scale)).normalize().as_tuple().exponent))
+
+
+def _handle(bus: Bus, drive: SiteDrive) -> Drive:
+    return bus.drive(drive.unit, drive.profile, unverified=drive.unverified, variants=drive.variants or None)
