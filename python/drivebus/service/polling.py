@@ -14,6 +14,7 @@ from drivebus.drive import Drive
 from drivebus.line.poll_samples import Sample
 from drivebus.poll import Poll
 from drivebus.service.changes import Changes
+from drivebus.sinks.picture import DrivePicture
 from drivebus.site import SiteDrive, SiteLine, SitePoll
 from drivebus.spool import Layout, Spool
 
@@ -31,12 +32,14 @@ class Polling:
 
     def __init__(self, line: SiteLine, polls: tuple[SitePoll, ...], spool: Spool | None) -> None:
         self._polls = [
-            (poll, chosen) for poll in polls if (chosen := [drive for drive in poll.drives if drive.line == line])
+            (place, poll, chosen)
+            for place, poll in enumerate(polls, 1)
+            if (chosen := [drive for drive in poll.drives if drive.line == line])
         ]
         self._spool = spool
         self._begun: list[Poll[Drive]] = []
         self._lock = threading.Lock()
-        self._last: dict[str, tuple[float, str]] = {}
+        self._last: dict[tuple[int, str], DrivePicture] = {}
 
     def begin(self, bus: Bus, stack: ExitStack) -> None:
         """Polls the drives on *bus*, until *stack* is closed.
@@ -45,11 +48,11 @@ class Polling:
             NotAllowed: A name is unknown or may not be read, or the interval is shorter than the line can carry.
         """
         self._begun = []
-        for poll, chosen in self._polls:
+        for place, poll, chosen in self._polls:
             drives = {_handle(bus, each): each.name for each in chosen}
             names = {drive: list(poll.registers) or drive.readable() for drive in drives}
             series = {drive: _Series(name, drive, names[drive], poll) for drive, name in drives.items()}
-            begun = bus.poll(names, poll.interval, callback=partial(self._take, series))
+            begun = bus.poll(names, poll.interval, callback=partial(self._take, place, series))
             self._begun.append(stack.enter_context(begun))
 
     def check(self) -> None:
@@ -59,17 +62,22 @@ class Polling:
 
     def status(self) -> dict[str, dict[str, Any]]:
         """Of each drive when it was asked last, as Unix time, and why there was no answer."""
-        with self._lock:
-            return {name: {"time": round(at, 3), "missing": missing} for name, (at, missing) in self._last.items()}
+        last = sorted(self.last(), key=lambda each: each.time)
+        return {each.layout.drive: {"time": round(each.time, 3), "missing": each.missing} for each in last}
 
-    def _take(self, series: Mapping[Drive, _Series], sample: Sample[Drive]) -> None:
+    def last(self) -> tuple[DrivePicture, ...]:
+        """What each drive said last, in each poll."""
+        with self._lock:
+            return tuple(self._last.values())
+
+    def _take(self, place: int, series: Mapping[Drive, _Series], sample: Sample[Drive]) -> None:
         of = series[sample.key]
         missing = "" if sample.missing is None else str(sample.missing)
         # A unit that is silent goes on being silent, whether it was asked or spared.
         kind = "" if sample.missing is None else type(sample.missing).__name__
         values = [] if missing else [sample[name] for name in of.layout.names]
         with self._lock:
-            self._last[of.layout.drive] = (sample.time, missing)
+            self._last[place, of.layout.drive] = DrivePicture(place, of.layout, sample.time, missing, tuple(values))
         if self._spool is not None and of.changes.keeps(sample.time, kind, values):
             self._spool.add(of.layout, sample.time, sample.answered - sample.time, missing, values)
 

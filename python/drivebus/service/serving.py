@@ -19,6 +19,7 @@ from drivebus.service.check import check
 from drivebus.service.notify import notify, watchdog_interval
 from drivebus.service.polling import Polling
 from drivebus.service.status import StatusFile
+from drivebus.sinks import GatewayPicture, LinePicture, Picture, Prometheus
 from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SiteLine
 from drivebus.spool import Spool
 
@@ -50,6 +51,8 @@ class Service:
         self._site = site
         self._tell = tell
         self._over = Latch()
+        self._metrics: Prometheus | None = None
+        self._why = ""
         of_line = {
             name: [each for each in site.share.gateways if each.line == line] for name, line in site.lines.items()
         }
@@ -72,12 +75,19 @@ class Service:
         finally:
             notify("STOPPING=1")
             self._over.set()
+            if self._metrics is not None:
+                self._metrics.close()
             for thread in threads:
                 thread.join()
             if self._spool is not None:
                 self._spool.close()
             with suppress(OSError):
                 status.remove()
+
+    def picture(self) -> Picture:
+        """How its lines and drives are now. Any thread."""
+        spooled, lost = (0, 0) if self._spool is None else (self._spool.added, self._spool.lost)
+        return Picture(time.time(), tuple(line.picture() for line in self._lines), spooled, lost)
 
     def end(self) -> None:
         """Ends it: `run` returns when all is closed."""
@@ -87,6 +97,7 @@ class Service:
         """Says how the service does, and that it lives: as long as each line has given somebody the turn meanwhile."""
         interval, turns, pinged = watchdog_interval(), {line.name: -1 for line in self._lines}, 0.0
         while not self._over.is_set() and (until is None or time.monotonic() < until):
+            self._tell_prometheus()
             # A disk that is full ends nobody's service.
             with suppress(OSError):
                 status.write(self.status())
@@ -97,6 +108,20 @@ class Service:
                 turns, pinged = now, time.monotonic()
             left = _AGAIN if until is None else min(_AGAIN, max(until - time.monotonic(), 0.0))
             self._over.wait(left if interval is None else min(left, interval / 2))
+
+    def _tell_prometheus(self) -> None:
+        """Listens for Prometheus, as soon as that can be."""
+        if self._site.prometheus is None or self._metrics is not None:
+            return
+        address = self._site.prometheus.address
+        try:
+            self._metrics = Prometheus(address, self.picture)
+        except DrivebusError as error:
+            if str(error) != self._why:
+                self._tell(f"prometheus: {error}; tried again each second")
+            self._why = str(error)
+        else:
+            self._tell(f"prometheus: metrics are at http://{address}/metrics")
 
     def status(self) -> dict[str, Any]:
         """How it does: the time, its process, and of each line what `drivebus serve --status` shows."""
@@ -225,6 +250,20 @@ class _Served:
         if len(told) > _AT_ONCE:
             self._tell(f"{self.name}: and {len(told) - _AT_ONCE} more like these")
 
+    def picture(self) -> LinePicture:
+        """How it is now. Any thread."""
+        there = self._open
+        if there is None:
+            return LinePicture(self.name, False, {})
+        bus, gateways = there
+        with suppress(DrivebusError):
+            stats = bus.stats()
+            counts = {name: stats[name] for name in stats if isinstance(stats[name], int | float)}
+            return LinePicture(
+                self.name, True, counts, self._polling.last(), tuple(_picture_of(gateway) for gateway in gateways)
+            )
+        return LinePicture(self.name, False, {})
+
     def status(self) -> dict[str, Any]:
         """How the line does."""
         if self._open is None:
@@ -250,6 +289,12 @@ class _Served:
                 for gateway in gateways
             },
         }
+
+
+def _picture_of(gateway: Gateway) -> GatewayPicture:
+    stats = gateway.stats
+    outcomes = ("answered", "failed", "refused", "late", "given_up", "busy")
+    return GatewayPicture(gateway.address, stats.clients, {name: getattr(stats, name) for name in outcomes})
 
 
 def _spool_of(site: Site, tell: Callable[[str], None]) -> Spool | None:

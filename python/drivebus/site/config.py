@@ -32,6 +32,7 @@ from drivebus.site.entries import SiteDrive, SiteLine
 from drivebus.site.polls import SitePoll, SiteSpool, polls_of, spool_of
 from drivebus.site.reading import Reading, Wrong, flag, one_of, quoted, text, texts, whole
 from drivebus.site.share import SiteShare, share_of
+from drivebus.site.sinks import SitePrometheus, prometheus_of
 
 __all__ = ["FILE", "Site"]
 
@@ -39,6 +40,7 @@ FILE = "drivebus.toml"
 """What the file is called."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_SECTIONS = ("lines", "drives", "groups", "share", "poll", "spool", "prometheus")
 _LARGEST = 1_000_000
 """Bytes that such a file may have."""
 
@@ -55,6 +57,7 @@ class Site:
         share: Who may use the lines, beside the programs of one user.
         polls: What a service asks the drives again and again.
         spool: Where it keeps what they say until others have it.
+        prometheus: Where Prometheus finds how they are.
     """
 
     path: Path
@@ -64,6 +67,7 @@ class Site:
     share: SiteShare = field(default_factory=SiteShare)
     polls: tuple[SitePoll, ...] = ()
     spool: SiteSpool | None = None
+    prometheus: SitePrometheus | None = None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Site:
@@ -109,7 +113,7 @@ class _Reader:
 
     def site(self) -> Site:
         """What the file says, or all that is wrong in it."""
-        self._file.check_keys(self._file.data, ("lines", "drives", "groups", "share", "poll", "spool"), ())
+        self._file.check_keys(self._file.data, _SECTIONS, ())
         lines = {name: line for name, line in self._tables("lines", self._line) if line is not None}
         drives = {
             name: drive
@@ -119,8 +123,9 @@ class _Reader:
         groups = self._groups(drives)
         share = share_of(self._file, lines, drives, groups)
         polls, spool = polls_of(self._file, drives, groups), spool_of(self._file)
+        prometheus = prometheus_of(self._file)
         self._file.finish()
-        return Site(self._file.path, lines, drives, groups, share, polls, spool)
+        return Site(self._file.path, lines, drives, groups, share, polls, spool, prometheus)
 
     def _tables(self, section: str, read: Callable[[str, dict[str, Any]], Any]) -> Iterator[tuple[str, Any]]:
         """Each table in *section*, as *read* makes it."""

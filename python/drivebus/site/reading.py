@@ -17,7 +17,20 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Key", "Reading", "Wrong", "flag", "listed", "number", "one_of", "quoted", "text", "texts", "whole"]
+__all__ = [
+    "Key",
+    "Reading",
+    "Wrong",
+    "address",
+    "flag",
+    "listed",
+    "number",
+    "one_of",
+    "quoted",
+    "text",
+    "texts",
+    "whole",
+]
 
 Key: TypeAlias = "tuple[str | int, ...]"
 """Where a value stands: the names of its tables and its own, and numbers within lists."""
@@ -176,6 +189,13 @@ def one_of(*allowed: str) -> Callable[[Any], str]:
         return str(value)
 
     return read
+
+
+def address(value: Any) -> str:
+    """`host:port`, or `[host]:port`."""
+    if not isinstance(value, str) or not re.fullmatch(r".+:\d{1,5}", value) or int(value.rpartition(":")[2]) > 0xFFFF:
+        raise Wrong('not an address and a port, such as "127.0.0.1:1502"')
+    return value
 
 
 def texts(value: Any) -> dict[str, str]:

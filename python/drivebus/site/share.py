@@ -18,7 +18,6 @@ Here it is read. What the names of registers and commands mean, and whether they
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,7 +25,7 @@ from typing import Any, Literal
 
 from drivebus import checks
 from drivebus.site.entries import SiteDrive, SiteLine
-from drivebus.site.reading import Key, Reading, Wrong, flag, listed, number, one_of, quoted, text, whole
+from drivebus.site.reading import Key, Reading, Wrong, address, flag, listed, number, one_of, quoted, text, whole
 
 __all__ = ["SiteAllow", "SiteGateway", "SiteShare", "share_of"]
 
@@ -135,9 +134,9 @@ class _Gateways:
     def tcp(self, table: dict[str, Any], where: Key) -> SiteGateway | None:
         file = self.file
         file.check_keys(table, ("address", "framing", *_OF_BOTH), where)
-        address = file.value(where, table, "address", _address, needed=True)
+        at = file.value(where, table, "address", address, needed=True)
         framing: Literal["tcp", "rtu"] = file.value(where, table, "framing", one_of("tcp", "rtu")) or "tcp"
-        return self._read(table, where, address, framing, _RULE)
+        return self._read(table, where, at, framing, _RULE)
 
     def pty(self, table: dict[str, Any], where: Key) -> SiteGateway | None:
         self.file.check_keys(table, ("path", *_OF_BOTH), where)
@@ -148,7 +147,7 @@ class _Gateways:
         self,
         table: dict[str, Any],
         where: Key,
-        address: str | None,
+        found_at: str | None,
         framing: Literal["tcp", "rtu"],
         rule: tuple[str, ...],
     ) -> SiteGateway | None:
@@ -161,9 +160,9 @@ class _Gateways:
             hint = checks.closest(name, self.lines)
             file.complain((*where, "line"), f'there is no line "{name}"{hint}; there are {quoted(self.lines)}')
         allow = [self._allow(each, there, line, rule) for there, each in file.tables(table, (*where, "allow"))]
-        if line is None or address is None:
+        if line is None or found_at is None:
             return None
-        return SiteGateway(line, address, framing, within or 1.0, dead_man, tuple(allow), file.line_of(where))
+        return SiteGateway(line, found_at, framing, within or 1.0, dead_man, tuple(allow), file.line_of(where))
 
     def _allow(self, table: dict[str, Any], where: Key, line: SiteLine | None, keys: tuple[str, ...]) -> SiteAllow:
         file = self.file
@@ -195,12 +194,6 @@ class _Gateways:
             tuple(commands or ()),
             at,
         )
-
-
-def _address(value: Any) -> str:
-    if not isinstance(value, str) or not re.fullmatch(r".+:\d{1,5}", value) or int(value.rpartition(":")[2]) > 0xFFFF:
-        raise Wrong('not an address and a port, such as "127.0.0.1:1502"')
-    return value
 
 
 def _absolute(value: Any) -> str:

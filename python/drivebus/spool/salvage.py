@@ -75,7 +75,7 @@ def _is_epoch(row: Row) -> bool:
 
 def _is_layout(row: Row) -> bool:
     try:
-        return Layout.of_text(row[1]).text() == row[1]
+        return Layout.of_text(row[1]).text() == str(row[1])
     except (TypeError, ValueError):
         return False
 

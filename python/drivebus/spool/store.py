@@ -97,6 +97,7 @@ class Spool:
         self._new: list[_New] = []
         self._reached: dict[str, int] = {}
         self._layouts: dict[Layout, int] = {}
+        self._added = 0
         self._lost = 0
         self._why = ""
         self._closing = threading.Event()
@@ -113,6 +114,7 @@ class Spool:
         new = _New(layout, at, took, missing, b"" if missing else layout.packed(values))
         with self._lock:
             self._new.append(new)
+            self._added += 1
             self._give_way()
 
     def reached(self, sink: str, seq: int) -> None:
@@ -128,6 +130,11 @@ class Spool:
     def last(self) -> int:
         """The number of the last sample that is in the file; 0: none is."""
         return self._last
+
+    @property
+    def added(self) -> int:
+        """How many samples were added since this was opened."""
+        return self._added
 
     @property
     def lost(self) -> int:

@@ -1,0 +1,80 @@
+"""How a plant is now: its lines, what its drives said last, and who asks. Plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from drivebus.spool import Layout
+from drivebus.values import Value
+
+__all__ = ["DrivePicture", "GatewayPicture", "LinePicture", "Picture"]
+
+
+@dataclass(frozen=True)
+class DrivePicture:
+    """What a drive said last, in one poll.
+
+    Attributes:
+        poll: Which poll it was, as they stand in the file, from 1.
+        layout: Which drive, and what it was asked.
+        time: Unix time in seconds at which it was asked.
+        missing: Why there are no values, in words; empty where there are.
+        values: One for each name of the layout.
+    """
+
+    poll: int
+    layout: Layout
+    time: float
+    missing: str
+    values: tuple[Value, ...]
+
+
+@dataclass(frozen=True)
+class GatewayPicture:
+    """What became of the requests at one gateway since its line was opened.
+
+    Attributes:
+        address: Where it is.
+        clients: Connections that are open.
+        requests: How many there were of each outcome.
+    """
+
+    address: str
+    clients: int
+    requests: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class LinePicture:
+    """A line.
+
+    Attributes:
+        name: What it is called.
+        open: Whether its port is open.
+        counts: What was counted since it was opened, by the names of `drivebus.Stats`; empty where it is not open.
+        drives: What each drive that is polled said last.
+        gateways: Who asks over the network.
+    """
+
+    name: str
+    open: bool
+    counts: Mapping[str, float]
+    drives: tuple[DrivePicture, ...] = ()
+    gateways: tuple[GatewayPicture, ...] = ()
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A plant.
+
+    Attributes:
+        time: Unix time in seconds.
+        lines: Its lines.
+        spooled: Samples that were kept since its service began; `lost`: those that gave way.
+    """
+
+    time: float
+    lines: tuple[LinePicture, ...]
+    spooled: int = 0
+    lost: int = 0
