@@ -271,6 +271,8 @@ running_frequency = 20
 line = "hall"
 unit = 9
 profile = "gd350"
+
+[spool]
 """
 
 
@@ -320,7 +322,7 @@ def test_what_drives_say_waits_in_the_spool(tmp_path: Path) -> None:
         ('["running_frequency"]', '["runing_frequency"]', 8, 'the closest is "running_frequency"'),
         ("running_frequency = 20", "output_current = 1", 11, "is not asked for output_current, which has a band"),
         ("running_frequency = 20", "running_frequency = -1", 11, "not a number from 0 to"),
-        ("[[poll]]\ndrives", "[spool]\nsize_mb = 1\n[[poll]]\ndrives", 2, "not a whole number from 10"),
+        ("[spool]\n", "[spool]\nsize_mb = 1\n", 20, "not a whole number from 10"),
     ],
 )
 def test_a_mistake_in_a_poll(tmp_path: Path, old: str, new: str, line: int, said: str) -> None:

@@ -61,7 +61,7 @@ class SiteSpool:
     """Where samples wait.
 
     Attributes:
-        path: The file.
+        path: The file; `drivebus-spool` beside that of the site, unless it says otherwise.
         size: Bytes that it may have.
     """
 
@@ -77,12 +77,14 @@ def polls_of(
     return tuple(_poll(file, table, where, drives, groups) for where, table in tables)
 
 
-def spool_of(file: Reading) -> SiteSpool:
-    """Where *file* says that samples wait: beside it, unless it says otherwise."""
-    table = file.data.get("spool", {})
+def spool_of(file: Reading) -> SiteSpool | None:
+    """Where *file* says that samples wait; None: nowhere, so that no disk wears for nothing."""
+    table = file.data.get("spool")
+    if table is None:
+        return None
     if not isinstance(table, dict):
         file.complain(("spool",), "spool is a table: [spool]")
-        table = {}
+        return None
     file.check_keys(table, ("path", "size_mb"), ("spool",))
     path = file.value(("spool",), table, "path", text) or "drivebus-spool"
     megabytes = file.value(("spool",), table, "size_mb", whole(*_MEGABYTES)) or 1_000
