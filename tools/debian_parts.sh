@@ -1,6 +1,7 @@
 #!/bin/sh
 # Brings mbpoll, libmodbus and LinuxCNC's HAL, which the interop tests talk to, tshark, which reads captures, valgrind,
-# which counts instructions, and strace, which writes down system calls, into .tools/ without touching the system.
+# which counts instructions, strace, which writes down system calls, and Prometheus, which scrapes metrics, into .tools/
+# without touching the system.
 #
 # Needs no root: packages are downloaded and unpacked, not installed. Where apt is not there it says what is missing,
 # and the checks that need it are skipped (with CI=true they fail).
@@ -26,11 +27,14 @@ have_tshark() { command -v tshark >/dev/null 2>&1 || [ -x "$tools/usr/bin/tshark
 have_hal() {
     [ "$(uname -s)" != Linux ] || command -v halrun >/dev/null 2>&1 || [ -x "$tools/linuxcnc/usr/bin/halrun" ]
 }
-have_all() { have_program && have_library && have_valgrind && have_strace && have_tshark && have_hal; }
+have_prometheus() { command -v promtool >/dev/null 2>&1 || [ -x "$tools/usr/bin/promtool" ]; }
+have_all() {
+    have_program && have_library && have_valgrind && have_strace && have_tshark && have_hal && have_prometheus
+}
 lacking() {
-    echo "of mbpoll, libmodbus, tshark, valgrind, strace and LinuxCNC some are missing ($1); the checks that need them will be" >&2
-    echo "skipped." >&2
-    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 tshark valgrind strace linuxcnc-uspace" >&2
+    echo "of mbpoll, libmodbus, tshark, valgrind, strace, Prometheus and LinuxCNC some are missing ($1); the checks that need" >&2
+    echo "them will be skipped." >&2
+    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 tshark valgrind strace linuxcnc-uspace prometheus" >&2
     echo "    macOS:           brew install libmodbus wireshark, and mbpoll from its source" >&2
     exit 0
 }
@@ -40,6 +44,7 @@ packages=
 have_program && have_library || packages="mbpoll libmodbus5"
 have_valgrind || packages="$packages valgrind"
 have_strace || packages="$packages strace libunwind8"
+have_prometheus || packages="$packages prometheus"
 wants_tshark=
 have_tshark || wants_tshark=yes
 command -v apt-get >/dev/null 2>&1 && command -v dpkg >/dev/null 2>&1 || lacking "no apt here"

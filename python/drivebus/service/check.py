@@ -6,6 +6,7 @@ Nothing is opened, and nothing is sent.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib.util import find_spec
 
 from drivebus import checks
 from drivebus.errors import BadArgument, NotAllowed
@@ -29,6 +30,8 @@ def check(site: Site) -> None:
     """
     wrong = {mistake for gateway in site.share.gateways for mistake in _of_gateway(gateway)}
     wrong |= {mistake for poll in site.polls for mistake in _of_poll(poll)}
+    if site.prometheus is not None and find_spec("prometheus_client") is None:
+        wrong.add((site.prometheus.at, "this needs prometheus-client: pip install 'drivebus[prometheus]'"))
     if wrong:
         count = "one mistake" if len(wrong) == 1 else f"{len(wrong)} mistakes"
         told = [f"{site.path}:{line}: {reason}" for line, reason in sorted(wrong)]

@@ -21,9 +21,11 @@ class SitePrometheus:
 
     Attributes:
         address: `host:port`.
+        at: In which line of the file its table begins.
     """
 
     address: str
+    at: int = 1
 
 
 def prometheus_of(file: Reading) -> SitePrometheus | None:
@@ -37,4 +39,4 @@ def prometheus_of(file: Reading) -> SitePrometheus | None:
         return None
     file.check_keys(table, ("address",), where)
     given = file.value(where, table, "address", address, needed=True)
-    return None if given is None else SitePrometheus(given)
+    return None if given is None else SitePrometheus(given, file.line_of(where))
