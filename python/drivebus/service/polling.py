@@ -94,7 +94,9 @@ class _Series:
             tuple(row.unit for row in rows),
             tuple(digits_of(row.scale) for row in rows),
         )
-        self.changes = Changes([poll.band.get(register, 0.0) for register in registers], poll.heartbeat)
+        # The sample nearest to the heartbeat: none comes on time to the microsecond.
+        heartbeat = poll.heartbeat - poll.interval / 2
+        self.changes = Changes([poll.band.get(register, 0.0) for register in registers], heartbeat)
 
 
 def digits_of(scale: float) -> int:
