@@ -14,7 +14,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import count, pairwise
 from pathlib import Path
 
 from drivebus.errors import DrivebusError
@@ -22,12 +22,12 @@ from drivebus.sim import FAULT_KINDS, Simulator
 
 from .child import Child, Outcome
 from .slave import UNIT
-from .verdict import HUNG, RIGHT, WRONG, judged, pace
+from .verdict import HUNG, PATIENCE, RIGHT, WRONG, Verdict, judged, pace
 
 RATE = 0.02  # of all answers, each kind
 SEED = 20
 READS, READS_OF_ALL = 300, 1000
-GIVEN_UP = 25  # reads in a row that were not right: the library is not asked further
+GIVEN_UP = 25  # reads in a row that were not right, for PATIENCE at least: the library is not asked further
 BAUD = 115_200
 ALL, UNPLUG = "all", "unplug"
 # Chance pulls out only what is in this process: here the port is unplugged by hand, before every 50th read.
@@ -55,6 +55,11 @@ class Tally:
     hits: int = 0  # answers that were spoilt
     slowest: float = 0.0  # seconds from the end of a read that was not right to the end of the next right one
     recovered: bool = True
+
+    def add(self, verdict: Verdict) -> None:
+        self.ends[verdict.kind] += 1
+        if verdict.kind not in (RIGHT, WRONG):
+            self.errors[verdict.detail] += 1
 
     @property
     def asked(self) -> int:
@@ -133,28 +138,31 @@ def _reads(
     tally: Tally,
     before: Callable[[int], None] = lambda _: None,
 ) -> None:
+    """The reads of a row; and more, which do not count, where its last one failed: that alone tells of no end."""
     failed_at: float | None = None
     in_a_row = 0
-    for number in range(reads):
-        before(number)
+    for number in count():
+        if number < reads:
+            before(number)
+        elif failed_at is None:
+            return
         asked = time.monotonic()
         address, values = pairs[number % len(pairs)]
         verdict = judged(read(address, values), values)
-        tally.ends[verdict.kind] += 1
         now = time.monotonic()
+        if number < reads:
+            tally.add(verdict)
         if verdict.kind == RIGHT:
             if failed_at is not None:
                 tally.slowest = max(tally.slowest, now - failed_at)
             failed_at, in_a_row = None, 0
             continue
-        if verdict.kind != WRONG:
-            tally.errors[verdict.detail] += 1
         failed_at = now if failed_at is None else failed_at
         in_a_row += 1
-        if verdict.kind == HUNG or in_a_row == GIVEN_UP:
-            break
+        if verdict.kind == HUNG or (in_a_row >= GIVEN_UP and now - failed_at >= PATIENCE):
+            tally.recovered = False
+            return
         pace(asked, in_a_row)
-    tally.recovered = failed_at is None
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ def page(columns: Sequence[Column]) -> str:
         [
             f"`{kind}`",
             *(
-                ("not within the row" if not tally.recovered else milliseconds(tally.slowest) if tally.slowest else "-")
+                ("never" if not tally.recovered else milliseconds(tally.slowest) if tally.slowest else "-")
                 for tally in (column.tallies[kind] for column in on_line)
             ),
         ]
@@ -116,7 +116,13 @@ def page(columns: Sequence[Column]) -> str:
                 "## Time to recover",
                 BACK,
                 table(["after", *titles], back),
-                FAULTS.format(reads=faults.READS, all=faults.READS_OF_ALL, seed=faults.SEED, streak=faults.GIVEN_UP),
+                FAULTS.format(
+                    reads=faults.READS,
+                    all=faults.READS_OF_ALL,
+                    seed=faults.SEED,
+                    streak=faults.GIVEN_UP,
+                    patience=PATIENCE,
+                ),
                 table(["fault, 2 %", *names], spoilt),
                 SLOWEST,
                 table(["fault, 2 %", *names], slow),
@@ -203,7 +209,8 @@ retries included. docs/reference/simulator.md says what each fault does; a `late
 500 ms after it was due, an `overtaken` one 220 to 800 ms, the port is unplugged before every 50th read, for 250 ms.
 
 Cells are right / wrong / error / hung. While the port is away errors come as fast as a library raises them.
-"Stopped": {streak} reads in a row were not right, or one hung, and no more were asked."""
+"Stopped": {streak} reads in a row and {patience:.0f} s long none was right, or one hung, and no more were asked; where
+the last read failed, others follow that are not counted, until one is right."""
 
 SLOWEST = "The longest time from the end of a read that was not right to the end of the next right one (a dash: none):"
 

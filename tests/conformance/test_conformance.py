@@ -16,10 +16,15 @@ import pytest
 if os.name == "nt":
     pytest.skip("no pty", allow_module_level=True)
 
-from . import wire
-from .faults import ALL, spoilt
+from drivebus.sim import Simulator
+
+from . import faults, wire
+from .child import Outcome
+from .faults import ALL, Tally, spoilt, spoilt_reads
 from .play import play
+from .report import counts
 from .rows import ROWS, Row
+from .slave import UNIT as UNIT_NUMBER
 from .slave import Slave
 
 # Longer than for the published table: on a busy machine a right answer shall not come too late, nor a call look hung.
@@ -72,6 +77,36 @@ def test_the_truth_is_told_in_every_row(row: Row, library: str, silent_on_08: bo
     assert result.verdict.keeps(row.must), result
     assert result.recovery.wrong == 0, result
     assert result.recovery.seconds is not None, result
+
+
+def ten_reads(*, fail: range) -> Tally:
+    """A row by a reader whose reads of these numbers fail, where 0 is the first of the row."""
+    number = -2
+
+    def read(_address: int, values: list[int]) -> Outcome:
+        nonlocal number
+        number += 1  # one is read before the row
+        return Outcome(0.0, error="NoAnswer") if number in fail else Outcome(0.0, result=values)
+
+    with Simulator({UNIT_NUMBER: "gd350"}, transport="process", clock="virtual") as simulator:
+        return spoilt_reads(simulator, read, "silence", reads=10)
+
+
+def test_a_reader_whose_last_read_alone_failed_did_not_stop() -> None:
+    tally = ten_reads(fail=range(9, 12))
+    assert tally.ends == {"right": 9, "error": 1}
+    assert tally.recovered
+    assert counts(tally) == "9 / 0 / 1 / 0"
+
+
+def test_a_reader_that_never_reads_again_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(faults, "PATIENCE", 0.1)
+    assert counts(ten_reads(fail=range(9, 10_000))) == "9 / 0 / 1 / 0, stopped"
+
+
+def test_a_reader_has_its_patience_within_a_row_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(faults, "GIVEN_UP", 2)
+    assert counts(ten_reads(fail=range(4, 8))) == "6 / 0 / 4 / 0"
 
 
 @LIBRARY

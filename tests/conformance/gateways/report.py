@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Sequence
 
-from .. import faults
+from .. import faults, verdict
 from ..report import machine, table
 from .crowd import FAMILIES, LINES, crowd
 from .measure import Column
@@ -35,7 +35,7 @@ def section(columns: Sequence[Column], seconds: float) -> str:
         table(["gateway", "version", "how it is used"], [_about(column) for column in columns]),
         LATE.format(patience=PATIENCE * 1e3, apart=APART * 1e3, pause=PAUSE * 1e3),
         table(["what happens", "true end", *titles], rows),
-        FAULTS.format(reads=faults.READS, all=faults.READS_OF_ALL, streak=faults.GIVEN_UP),
+        FAULTS.format(reads=faults.READS, all=faults.READS_OF_ALL, streak=faults.GIVEN_UP, patience=verdict.PATIENCE),
         table(["fault, 2 %", *titles], spoilt),
         CROWD.format(families=", ".join(FAMILIES.values()), seconds=seconds),
         table(["what disturbs the line", "clients", *titles], crowds),
@@ -98,7 +98,8 @@ FAULTS = """\
 The faults of [the simulator](#the-simulators-faults), through each gateway: {reads} reads of two registers by one
 client in each row, {all} in the last, at 115200 bit/s. A `late` answer comes 625 to 1250 ms after it was due, an
 `overtaken` one 550 to 2000 ms; modbus-relay waits for 1500 ms. Cells are right / wrong / error / hung, which is no
-answer in 5 s. "Stopped": {streak} reads in a row were not right, or one hung, and no more were asked."""
+answer in 5 s. "Stopped": {streak} reads in a row and {patience:.0f} s long none was right, or one hung, and no more
+were asked; where the last read failed, others follow that are not counted, until one is right."""
 
 CROWD = """\
 Twenty clients at once for {seconds:.0f} s before four simulated drives ({families}) at 115200 bit/s:
