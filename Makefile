@@ -216,12 +216,14 @@ matrix: $(VENV)/.dev $(VENV)/.wheel ## some minutes; see tests/python/matrix.py
 screens: $(VENV)/.dev $(VENV)/.wheel ## the screen of every command, in every window, as text in target/screens
 	DRIVEBUS_SCREENS=all $(PYTEST) -q tests/python/test_cli_screens.py
 
-# One section of the page alone, and for how many seconds a crowd asks each gateway: make conformance SECTION=gateways CROWD=3600
+# One section of the page alone, and for how many seconds a crowd asks drivebus's gateway, on either line; others are asked for
+# 20 s at most: make conformance SECTION=gateways CROWD=3600
 SECTION ?=
 CROWD   ?= 20
 
 conformance: $(PEERS)/.installed interop-parts ## writes docs/developers/conformance.md
 	@sh tools/modbus_relay.sh
+	$(CARGO) build $(LOCKED) --quiet --release -p drivebus-benches --example crowd
 	$(PEERS)/bin/python -m tests.conformance.run --seconds $(CROWD) \
 	    $(if $(ONLY),--only $(ONLY),--out docs/developers/conformance.md $(if $(SECTION),--section $(SECTION)))
 

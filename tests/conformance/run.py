@@ -94,7 +94,7 @@ def main() -> int:
     what.add_argument("--only", nargs="+", help="rows and faults whose name begins so; they are printed, not written")
     parser.add_argument("--section", choices=[gateways.NAME], help="of the page, measure and write this section alone")
     crowd = parser.add_mutually_exclusive_group()
-    crowd.add_argument("--seconds", type=float, default=SECONDS, help="how long a crowd asks each gateway")
+    crowd.add_argument("--seconds", type=float, default=SECONDS, help="how long a crowd asks drivebus")
     crowd.add_argument("--hour", action="store_const", const=3600.0, dest="seconds")
     given = parser.parse_args()
     beginnings = tuple(given.only or [""])
@@ -103,7 +103,7 @@ def main() -> int:
     gateways_ = gateways.run(told.gateway, beginnings, given.seconds)
     if given.out:
         before = given.out.read_text(encoding="utf-8") if given.section else page(libraries_)
-        given.out.write_text(replaced(before, section(gateways_, given.seconds)), encoding="utf-8")
+        given.out.write_text(replaced(before, section(gateways_)), encoding="utf-8")
         print(f"wrote {given.out}")
     print(f"drivebus, to be looked at: {', '.join(told.wrong) or 'nothing'}")
     return 1 if told.wrong else 0

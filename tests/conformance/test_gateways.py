@@ -7,6 +7,7 @@ import os
 import socket
 import struct
 import threading
+from collections import Counter
 from collections.abc import Callable
 
 import pytest
@@ -15,7 +16,7 @@ if os.name == "nt":
     pytest.skip("no pty", allow_module_level=True)
 
 from . import wire
-from .gateways import crowd
+from .gateways import crowd, crowd_clients
 from .gateways.measure import Column, names, spoilt
 from .gateways.programs import GATEWAYS, OURS
 from .gateways.report import NOT_HERE, replaced, section
@@ -106,6 +107,20 @@ def test_no_two_questions_of_a_crowd_have_the_same_answer() -> None:
     assert {each.unit for each in questions} == set(crowd.FAMILIES)
 
 
+def test_a_crowd_is_of_twenty_whoever_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    for there in (list(crowd.CROWD), ["strict"]):
+        monkeypatch.setattr(crowd_clients, "here", lambda there=there: there)
+        assert sum(crowd.crowd().values()) == 20
+
+
+def test_a_page_says_for_how_long_each_crowd_asked() -> None:
+    ours, other = Column(OURS, version="1"), Column(GATEWAYS[1], version="1")
+    ends = {make: Counter({RIGHT: 2}) for make in crowd.crowd()}
+    ours.crowds[crowd.HOSTILE] = crowd.Crowd(ends, 3600.4)
+    other.crowds[crowd.HOSTILE] = crowd.Crowd(ends, 20.0)
+    assert f"| {crowd.HOSTILE} | for | 3600 s | 20 s |" in section([ours, other])
+
+
 def test_a_section_takes_the_place_of_its_own_and_of_nothing_else() -> None:
     page = "# Page\n\n## One\n\n1\n\n## Two\n\n2\n\n## Three\n\n3\n"
     assert replaced(page, "## Two\n\nnew\n") == "# Page\n\n## One\n\n1\n\n## Two\n\nnew\n\n## Three\n\n3\n"
@@ -118,7 +133,7 @@ def test_each_row_has_a_name_of_its_own() -> None:
 
 
 def test_a_gateway_that_is_not_here_is_a_column_that_says_so() -> None:
-    text = section([Column(OURS, version="1.2.3"), Column(GATEWAYS[1], missing="nobody built it")], 20.0)
+    text = section([Column(OURS, version="1.2.3"), Column(GATEWAYS[1], missing="nobody built it")])
     assert f"| {GATEWAYS[1].title} | {NOT_HERE} | nobody built it |" in text
     for row in ROWS:
         assert f"| {row.name} | {row.must} | - | {NOT_HERE} |" in text

@@ -1,4 +1,4 @@
-"""Twenty clients at once, of five makes, before a line of four families of simulated drives.
+"""Twenty clients at once, of six makes, before a line of four families of simulated drives.
 
 What is true is what each simulated drive says of its own parameters, which nobody changes.
 """
@@ -11,6 +11,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from drivebus.sim import Simulator
@@ -22,14 +23,23 @@ from .crowd_clients import Question
 from .programs import HOST, TIMEOUT, Gateway
 
 FAMILIES = {1: "gd350", 2: "vfd500", 3: "gd20", 4: "gd600"}
-CROWD = {"strict": 5, "pymodbus": 5, "pymodbus, asyncio": 4, "libmodbus": 4, "mbpoll": 2}
+CROWD = {"strict": 4, "pymodbus": 4, "pymodbus, asyncio": 4, "libmodbus": 3, "mbpoll": 2, "tokio-modbus": 3}
 SECONDS = 20.0
 QUIET, HOSTILE = "nothing disturbs it", "2 % of every fault"
 LINES = (QUIET, HOSTILE)
 MARGIN = 90.0  # seconds that the processes may take beyond what they were told
 
-Ends = dict[str, Counter[str]]
-"""How the reads of each make ended."""
+
+@dataclass(frozen=True)
+class Crowd:
+    """How the reads of each make ended, and for how many seconds all of them asked."""
+
+    ends: dict[str, Counter[str]]
+    seconds: float
+
+    @property
+    def total(self) -> Counter[str]:
+        return sum(self.ends.values(), Counter())
 
 
 def questions(simulator: Simulator) -> list[Question]:
@@ -55,7 +65,7 @@ def crowd() -> dict[str, int]:
     return clients
 
 
-def run(gateway: Gateway, line: str, seconds: float = SECONDS) -> Ends:
+def run(gateway: Gateway, line: str, seconds: float = SECONDS) -> Crowd:
     """All of them before one gateway, for so long."""
     with tempfile.TemporaryDirectory() as folder:
         port = Path(folder) / "port"
@@ -67,7 +77,7 @@ def run(gateway: Gateway, line: str, seconds: float = SECONDS) -> Ends:
                 return _all_at_once(address, seconds, asked)
 
 
-def _all_at_once(address: str, seconds: float, asked: Sequence[Question]) -> Ends:
+def _all_at_once(address: str, seconds: float, asked: Sequence[Question]) -> Crowd:
     host, _, port = address.rpartition(":")
     # The makes that can say so come from an address each, as from machines of their own.
     sources = iter(f"127.0.0.{number}" for number in range(2, 250))
@@ -90,10 +100,12 @@ def _all_at_once(address: str, seconds: float, asked: Sequence[Question]) -> End
         process.stdin.close()
         process.stdin = None
         running[make] = process
-    ends = {}
+    ends, took = {}, []
     for make, process in running.items():
         said, complained = process.communicate(timeout=seconds + MARGIN)
         if not said:
             raise RuntimeError(f"{make}: {complained}")
-        ends[make] = Counter(json.loads(said))
-    return ends
+        answer = json.loads(said)
+        ends[make] = Counter(answer["ends"])
+        took.append(answer["seconds"])
+    return Crowd(ends, min(took))

@@ -3,7 +3,8 @@
     python -m tests.conformance.gateways.crowd_clients MAKE < ORDER
 
 The order is JSON: where the gateway is, how many seconds, from which addresses of this machine the clients come (one
-client each), and the questions: unit, address, and the words that stand there. The answer is JSON: how the reads ended.
+client each), and the questions: unit, address, and the words that stand there. The answer is JSON: how the reads ended,
+and how many seconds they took together.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..child import ROOT
@@ -223,18 +225,37 @@ def mbpoll(order: Order) -> Counter[str]:
     return in_threads(order, lambda _source: ask)
 
 
+def tokio_modbus_file() -> Path | None:
+    """What cargo makes of benches/rust/crowd.rs."""
+    file = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release/examples/crowd"
+    return file if file.exists() else None
+
+
+def tokio_modbus(order: Order) -> Counter[str]:
+    file = tokio_modbus_file()
+    assert file is not None
+    questions = [question._asdict() for question in order.questions]
+    given = json.dumps({**order._asdict(), "questions": questions, "timeout": TIMEOUT, "pause": PAUSE})
+    return Counter(json.loads(subprocess.run([file], input=given, capture_output=True, text=True, check=True).stdout))
+
+
 MAKES: dict[str, Callable[[Order], Counter[str]]] = {
     "strict": own,
     "pymodbus": pymodbus,
     "pymodbus, asyncio": pymodbus_async,
     "libmodbus": libmodbus,
     "mbpoll": mbpoll,
+    "tokio-modbus": tokio_modbus,
 }
 
 
 def here() -> list[str]:
     """The makes that this machine has."""
-    lacking = {"libmodbus": libmodbus_file, "mbpoll": mbpoll_file}
+    lacking: dict[str, Callable[[], object]] = {
+        "libmodbus": libmodbus_file,
+        "mbpoll": mbpoll_file,
+        "tokio-modbus": tokio_modbus_file,
+    }
     return [make for make in MAKES if make not in lacking or lacking[make]() is not None]
 
 
@@ -243,7 +264,10 @@ def main() -> None:
     logging.disable()
     given = json.loads(sys.stdin.read())
     questions = [Question(*each) for each in given.pop("questions")]
-    print(json.dumps(MAKES[sys.argv[1]](Order(**given, questions=questions))))
+    order = Order(**given, questions=questions)
+    began = time.monotonic()
+    ends = MAKES[sys.argv[1]](order)
+    print(json.dumps({"ends": ends, "seconds": time.monotonic() - began}))
 
 
 if __name__ == "__main__":

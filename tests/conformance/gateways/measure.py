@@ -27,7 +27,7 @@ class Column:
     version: str = ""
     missing: str = ""
     cells: dict[str, str] = field(default_factory=dict)  # by the row's key, or the kind of fault
-    crowds: dict[str, crowd.Ends] = field(default_factory=dict)  # by what disturbs the line
+    crowds: dict[str, crowd.Crowd] = field(default_factory=dict)  # by what disturbs the line
 
     @property
     def title(self) -> str:
@@ -56,7 +56,7 @@ def names() -> list[str]:
 
 
 def run(say: Say, beginnings: Sequence[str] = ("",), seconds: float = crowd.SECONDS) -> list[Column]:
-    """The rows whose names begin so, with every gateway that is here. *seconds* is how long a crowd asks."""
+    """The rows whose names begin so, with every gateway that is here. *seconds* is how long a crowd asks drivebus."""
     made = columns()
     here = [column for column in made if not column.missing]
     chosen = [name for name in names() if name.startswith(tuple(beginnings))]
@@ -78,13 +78,12 @@ def run(say: Say, beginnings: Sequence[str] = ("",), seconds: float = crowd.SECO
 def _crowd(column: Column, line: str, say: Say, seconds: float) -> None:
     what = f"{NAME}-{CROWD}: {line}"
     try:
-        found = crowd.run(column.gateway, line, seconds)
+        found = crowd.run(column.gateway, line, seconds if is_ours(column) else min(seconds, crowd.SECONDS))
     except (DidNotStart, OSError) as reason:
         say(column, what, f"did not serve: {reason}", True)
         return
     column.crowds[line] = found
-    total = sum((Tally(each) for each in found.values()), Tally())
-    say(column, what, ends(total), total.ends[WRONG] > 0)
+    say(column, what, f"{ends(Tally(found.total))}, {found.seconds:.0f} s", found.total[WRONG] > 0)
 
 
 def _cell(column: Column, key: str, say: Say, play: Callable[[Gateway], Cell]) -> None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from .. import faults, verdict
 from ..report import machine, table
-from .crowd import FAMILIES, LINES, crowd
+from .crowd import FAMILIES, LINES, Crowd, crowd
 from .measure import Column
 from .programs import TIMEOUT
 from .rows import APART, PATIENCE, PAUSE, ROWS, ends
@@ -17,17 +17,21 @@ HEADING = "## Gateways: Modbus TCP before a line"
 NOT_HERE = "not to be had"
 
 
-def section(columns: Sequence[Column], seconds: float) -> str:
+def section(columns: Sequence[Column]) -> str:
     """The whole section."""
     titles = [column.title for column in columns]
     rows = [[row.name, row.must, *(_cell(column, row.key) for column in columns)] for row in ROWS]
     spoilt = [[f"`{kind}`", *(_cell(column, kind) for column in columns)] for kind in faults.KINDS]
-    makes = {make: f"{make}, {count}" for make, count in crowd().items()}
-    crowds = []
-    for line in LINES:
-        for make, name in makes.items():
-            crowds.append([line, name, *(_crowd(column, line, [make]) for column in columns)])
-        crowds.append([line, "all", *(_crowd(column, line, list(makes)) for column in columns)])
+    told: dict[str, Callable[[Crowd], str]] = {
+        **{f"{make}, {count}": _ends_of(make) for make, count in crowd().items()},
+        "all": lambda found: ends(Tally(found.total)),
+        "for": lambda found: f"{found.seconds:.0f} s",
+    }
+    crowds = [
+        [line, name, *(_crowd(column, line, each) for column in columns)]
+        for line in LINES
+        for name, each in told.items()
+    ]
     today = datetime.datetime.now(tz=datetime.timezone.utc).date()
     parts = [
         HEADING,
@@ -37,7 +41,7 @@ def section(columns: Sequence[Column], seconds: float) -> str:
         table(["what happens", "true end", *titles], rows),
         FAULTS.format(reads=faults.READS, all=faults.READS_OF_ALL, streak=faults.GIVEN_UP, patience=verdict.PATIENCE),
         table(["fault, 2 %", *titles], spoilt),
-        CROWD.format(families=", ".join(FAMILIES.values()), seconds=seconds),
+        CROWD.format(families=", ".join(FAMILIES.values())),
         table(["what disturbs the line", "clients", *titles], crowds),
     ]
     return "\n\n".join(parts) + "\n"
@@ -61,10 +65,14 @@ def _cell(column: Column, key: str) -> str:
     return NOT_HERE if column.missing else column.cells.get(key, "-")
 
 
-def _crowd(column: Column, line: str, makes: Sequence[str]) -> str:
+def _crowd(column: Column, line: str, told: Callable[[Crowd], str]) -> str:
     if column.missing or line not in column.crowds:
         return NOT_HERE if column.missing else "-"
-    return ends(sum((Tally(column.crowds[line][make]) for make in makes), Tally()))
+    return told(column.crowds[line])
+
+
+def _ends_of(make: str) -> Callable[[Crowd], str]:
+    return lambda found: ends(Tally(found.ends[make]))
 
 
 INTRODUCTION = """\
@@ -102,7 +110,7 @@ answer in 5 s. "Stopped": {streak} reads in a row and {patience:.0f} s long none
 were asked; where the last read failed, others follow that are not counted, until one is right."""
 
 CROWD = """\
-Twenty clients at once for {seconds:.0f} s before four simulated drives ({families}) at 115200 bit/s:
+Twenty clients at once before four simulated drives ({families}) at 115200 bit/s, for as long as the rows "for" say:
 clients as above, and others that people use, each with a time-out of 5 s. They read two registers at a time, from all
 units in a random order; no two questions have the same answer. libmodbus and mbpoll come from one address, the others
 from an address each. Cells are right / wrong / error / none."""
