@@ -84,20 +84,16 @@ def _of_rule(allow: SiteAllow, moved: list[str]) -> Iterator[tuple[int, str]]:
 def _of_poll(poll: SitePoll) -> Iterator[tuple[int, str]]:
     at = poll.lines.get("drives", poll.lines[""])
     for drive in poll.drives:
-        if drive.profile is None:
-            yield at, f'"{drive.name}" has no profile, and a poll needs one: say it in [drives.{drive.name}]'
+        evidence = _known(drive, "a poll")
+        if isinstance(evidence, str):
+            yield at, evidence
             continue
         try:
-            profile = _profile_of(drive)
-        except NotAllowed as error:
-            yield at, f'"{drive.name}": {error}'
-            continue
-        try:
-            Evidence(profile, drive.unit, drive.unverified).require_readable(poll.registers)
+            evidence.require_readable(poll.registers)
         except NotAllowed as error:
             yield poll.lines["registers"], f'"{drive.name}": {error}'
         else:
-            asked = poll.registers or profile.monitor_names()
+            asked = poll.registers or evidence.profile.monitor_names()
             for name in poll.band:
                 if name not in asked:
                     hint = checks.closest(name, asked)
@@ -109,20 +105,25 @@ def _profile_of(drive: SiteDrive) -> Profile:
     return profile.with_variants(drive.variants) if drive.variants else profile
 
 
+def _known(drive: SiteDrive, who: str) -> Evidence | str:
+    """What is known of the family of *drive*, which *who* needs, or what is wrong with it."""
+    if drive.profile is None:
+        return f'"{drive.name}" has no profile, and {who} needs one: say it in [drives.{drive.name}]'
+    try:
+        return Evidence(_profile_of(drive), drive.unit, drive.unverified)
+    except NotAllowed as error:
+        return f'"{drive.name}": {error}'
+
+
 def _of_drive(allow: SiteAllow, drive: SiteDrive, moved: list[str]) -> Iterator[tuple[int, str]]:
     at = allow.lines["drives"]
-    if drive.profile is None:
-        yield at, f'"{drive.name}" has no profile, and who writes to it needs one: say it in [drives.{drive.name}]'
+    evidence = _known(drive, "who writes to it")
+    if isinstance(evidence, str):
+        yield at, evidence
         return
     if drive.read_only:
         yield at, f'"{drive.name}" is read_only'
         return
-    try:
-        profile = _profile_of(drive)
-    except NotAllowed as error:
-        yield at, f'"{drive.name}": {error}'
-        return
-    evidence = Evidence(profile, drive.unit, drive.unverified)
     moves = False
     named: list[tuple[str, list[str | int], list[str]]] = [("write", [name], []) for name in allow.write] + [
         ("commands", [], [name]) for name in allow.commands
