@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +16,7 @@ from drivebus import Allow, Bus, Gateway, PortError, Simulator
 
 from .tcp_client import seen
 from .test_gateway import rtu
+from .test_shared_group import GROUP
 
 pytestmark = pytest.mark.skipif(not Path("/dev/ptmx").exists(), reason="no pseudo-terminals")
 
@@ -124,6 +126,27 @@ def test_whom_it_is_for_and_what_is_left_of_it(bus: Bus, link: Path) -> None:
         with Gateway(bus, link):
             assert link.readlink() != first
     assert not link.is_symlink()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a file to a group that is not its own")
+def test_the_users_of_a_group_may_open_it(link: Path) -> None:
+    with (
+        Simulator({1: "gd350"}, transport="pty", baudrate=115200) as simulator,
+        Bus(simulator.port, baudrate=115200, group=GROUP) as bus,
+        Gateway(bus, link),
+    ):
+        there = link.stat()
+        assert (stat.S_IMODE(there.st_mode), there.st_gid) == (0o660, GROUP)
+
+
+def test_who_has_it_open_at_the_end_sees_a_hang_up(bus: Bus, link: Path) -> None:
+    with Gateway(bus, link, answer_within=20.0) as gateway, opened(link) as program:
+        program.write(LOOK)
+        assert program.read(len(LOOKED)) == LOOKED
+        gateway.close()
+        with pytest.raises(serial.SerialException):
+            program.read(1)
+        assert gateway.stats.clients == 0
 
 
 def test_a_program_that_takes_no_answer_is_cut_off(link: Path) -> None:

@@ -15,7 +15,7 @@
 //! | `commanders`, `silence` | who commanded motion, and is gone or silent: a dead man's switch |
 //! | `desk` | what one of them has asked, and when it has to be answered |
 //! | `clients` | how many there may be, and who gives way |
-//! | `stream`, `terminal` | what connects one: over the network, or a pseudo-terminal |
+//! | `stream`, `terminal`, `openings` | what connects one: over the network, or a pseudo-terminal |
 //! | `door`, `terminal_door` | where they come in |
 //! | `audit`, `counts` | what they wrote, and what happened |
 //! | `together` | reads that wait, and who waits for the same |
@@ -38,6 +38,8 @@ mod door;
 mod framing;
 mod mailbox;
 mod network;
+#[cfg(target_os = "linux")]
+mod openings;
 mod reader;
 mod requests;
 mod rights;

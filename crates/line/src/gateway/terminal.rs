@@ -2,15 +2,16 @@
 
 use std::io::{self, ErrorKind};
 use std::os::fd::{AsFd as _, OwnedFd};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use drivebus_rtu::Instant;
 use rustix::event::{EventfdFlags, PollFd, PollFlags, eventfd};
 use rustix::io::Errno;
 
+use crate::gateway::openings::Openings;
 use crate::gateway::stream::{HURRY, Stream};
-use crate::system::clock::{monotonic, wait_for, wait_for_any};
+use crate::system::clock::{monotonic, wait_for_any};
 use crate::system::inherited::Kept;
 
 /// Once rung, it is heard by all who wait, and for good.
@@ -36,15 +37,18 @@ impl Bell {
 #[derive(Debug)]
 pub(super) struct Terminal {
     ours: Arc<Kept<OwnedFd>>,
+    openings: Arc<Openings>,
+    /// How often it had been closed when this program had it.
+    closed: u64,
     over: Bell,
     /// Whether it is over. Held where bytes are taken or given, so that none of this program's is another's.
     is_over: Mutex<bool>,
-    was_left: AtomicBool,
 }
 
 impl Terminal {
-    pub(super) fn new(ours: Arc<Kept<OwnedFd>>) -> io::Result<Self> {
-        Ok(Self { ours, over: Bell::new()?, is_over: Mutex::default(), was_left: AtomicBool::default() })
+    /// Of who has it since it had been `closed` so often.
+    pub(super) fn new(ours: Arc<Kept<OwnedFd>>, openings: Arc<Openings>, closed: u64) -> io::Result<Self> {
+        Ok(Self { ours, openings, closed, over: Bell::new()?, is_over: Mutex::default() })
     }
 
     /// Heard when it is over.
@@ -54,44 +58,48 @@ impl Terminal {
 
     /// Whether its program has closed it.
     pub(super) fn was_left(&self) -> bool {
-        self.was_left.load(Ordering::Acquire)
+        self.openings.closed() != self.closed
     }
 
     fn is_over(&self) -> MutexGuard<'_, bool> {
         self.is_over.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits until the terminal is ready for `events`, or has been left, or it is over.
-    fn wait(&self, events: PollFlags, within: Duration) -> io::Result<()> {
+    /// Waits until the terminal is ready for `events`, somebody opened or closed it, or it is over.
+    fn wait(&self, events: PollFlags, until: Instant) -> io::Result<()> {
         let ours = PollFd::from_borrowed_fd(self.ours.as_fd(), events);
-        let ready = wait_for_any(&mut [ours, self.over.waiting()], monotonic() + within)?;
+        let ready = wait_for_any(&mut [ours, self.openings.waiting(), self.over.waiting()], until)?;
         ready.map(drop).ok_or_else(|| ErrorKind::TimedOut.into())
     }
 }
 
 impl Stream for Terminal {
     fn read(&self, bytes: &mut [u8], within: Duration) -> io::Result<usize> {
-        self.wait(PollFlags::IN, within)?;
-        let is_over = self.is_over();
-        if *is_over {
-            return Ok(0);
-        }
-        match rustix::io::read(&**self.ours, bytes) {
-            // Nobody has it open any more.
-            Err(Errno::IO) => {
-                self.was_left.store(true, Ordering::Release);
-                Ok(0)
+        let until = monotonic() + within;
+        loop {
+            self.wait(PollFlags::IN, until)?;
+            let is_over = self.is_over();
+            if *is_over || self.was_left() {
+                return Ok(0);
             }
-            read => Ok(read?),
+            match rustix::io::read(&**self.ours, &mut *bytes) {
+                // Somebody opened it.
+                Err(Errno::AGAIN) => {}
+                // Nobody has it open any more.
+                Err(Errno::IO) => return Ok(0),
+                // They may be the next program's, and nothing tells: it asks again.
+                Ok(_) if self.was_left() => return Ok(0),
+                read => return Ok(read?),
+            }
         }
     }
 
     fn write(&self, mut bytes: &[u8]) -> io::Result<()> {
         let until = monotonic() + HURRY;
         while !bytes.is_empty() {
-            self.wait(PollFlags::OUT, until.saturating_duration_since(monotonic()))?;
+            self.wait(PollFlags::OUT, until)?;
             let is_over = self.is_over();
-            if *is_over {
+            if *is_over || self.was_left() {
                 return Err(ErrorKind::BrokenPipe.into());
             }
             match rustix::io::write(&**self.ours, bytes) {
@@ -109,8 +117,7 @@ impl Stream for Terminal {
     }
 
     fn has_hung_up(&self) -> bool {
-        let left = wait_for(self.ours.as_fd(), PollFlags::HUP, monotonic());
-        *self.is_over() || left.is_ok_and(|ready| ready.is_some_and(|ready| ready.contains(PollFlags::HUP)))
+        *self.is_over() || self.was_left()
     }
 
     /// Nobody else waits for it.

@@ -5,21 +5,19 @@ use std::io;
 use std::net::{IpAddr, Ipv4Addr};
 use std::os::fd::{AsFd as _, OwnedFd};
 use std::os::unix::fs::{PermissionsExt as _, chown};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_rtu::Instant;
 use rustix::event::{PollFd, PollFlags};
-use rustix::fs::inotify::{self, CreateFlags, WatchFlags};
-use rustix::fs::{Mode, OFlags};
-use rustix::termios::{QueueSelector, tcflush};
 
 use crate::gateway::door::Hall;
+use crate::gateway::openings::Openings;
 use crate::gateway::stream::Stream as _;
 use crate::gateway::terminal::{Bell, Terminal};
 use crate::ports::pty::{PtyLink, open_raw};
-use crate::system::clock::{LOOK_UP, monotonic, wait_for_any};
+use crate::system::clock::{LOOK_UP, monotonic, wait_for, wait_for_any};
 use crate::system::inherited::Kept;
 
 /// How long nothing comes before what comes next is taken for a request again, after what was none.
@@ -33,9 +31,7 @@ const NEVER: Duration = Duration::MAX;
 #[derive(Debug)]
 pub(super) struct Found {
     ours: Arc<Kept<OwnedFd>>,
-    theirs: PathBuf,
-    /// Told by the system when a program opens it.
-    openings: Kept<OwnedFd>,
+    openings: Arc<Openings>,
     _link: PtyLink,
 }
 
@@ -47,10 +43,9 @@ impl Found {
         let mode = if group.is_some() { 0o660 } else { 0o600 };
         chown(&theirs, None, group)?;
         std::fs::set_permissions(&theirs, std::fs::Permissions::from_mode(mode))?;
-        let openings = inotify::init(CreateFlags::CLOEXEC | CreateFlags::NONBLOCK)?;
-        inotify::add_watch(&openings, &theirs, WatchFlags::OPEN)?;
+        let openings = Arc::new(Openings::of(&theirs)?);
         let link = PtyLink::new(link.to_owned(), &theirs)?;
-        Ok(Self { ours: Arc::new(Kept::new(ours)), theirs, openings: Kept::new(openings), _link: link })
+        Ok(Self { ours: Arc::new(Kept::new(ours)), openings, _link: link })
     }
 }
 
@@ -66,22 +61,23 @@ pub(super) struct TerminalDoor {
 impl TerminalDoor {
     /// Lets one program after the other in, until it is closed.
     pub(super) fn stand(&self) {
-        while self.somebody_asks() {
-            if let Err(error) = self.serve() {
-                self.hall.tell(&error);
-                // No file is left to open, most likely: that does not end by being tried at once.
-                let _ = wait_for_any(&mut [self.closing.waiting()], far(LOOK_UP));
-            }
-        }
-    }
-
-    /// Waits for a program that writes; false: this is closed.
-    fn somebody_asks(&self) -> bool {
         loop {
             match self.wait(NEVER) {
-                Heard::Bytes => return true,
-                Heard::Closing => return false,
-                Heard::Left => self.wait_for_an_opening(),
+                Heard::Closing => return,
+                Heard::Bytes => {
+                    if let Err(error) = self.serve() {
+                        self.hall.tell(&error);
+                        // No file is left to open, most likely: that does not end by being tried at once.
+                        let _ = wait_for_any(&mut [self.closing.waiting()], far(LOOK_UP));
+                    }
+                }
+                Heard::Opening => {
+                    self.found.openings.closed();
+                }
+                Heard::Left => {
+                    let _ = wait_for_any(&mut [self.found.openings.waiting(), self.closing.waiting()], far(NEVER));
+                    self.found.openings.closed();
+                }
                 Heard::Nothing => {}
             }
         }
@@ -89,48 +85,57 @@ impl TerminalDoor {
 
     /// Serves the program that has it open until that closes it, or sends what is no request.
     fn serve(&self) -> io::Result<()> {
-        self.forget_answers()?;
-        let terminal = Arc::new(Terminal::new(Arc::clone(&self.found.ours))?);
+        let Found { ours, openings, .. } = &self.found;
+        // What the last one did not take is not for this one, which has asked and was not answered yet.
+        openings.forget_answers()?;
+        let closed = openings.closed();
+        if self.is_left() {
+            self.throw_away();
+            return Ok(());
+        }
+        let terminal = Arc::new(Terminal::new(Arc::clone(ours), Arc::clone(openings), closed)?);
         self.hall.let_in(Arc::<Terminal>::clone(&terminal), HERE, self.name.clone())?;
         wait_for_any(&mut [terminal.over(), self.closing.waiting()], far(NEVER))?;
         terminal.end();
-        if !terminal.was_left() {
+        if terminal.was_left() {
+            openings.forget_answers()?;
+        } else {
             self.wait_for_a_pause();
         }
         Ok(())
     }
 
-    /// What the last program did not take is not for this one, which has asked and was not answered yet.
-    fn forget_answers(&self) -> io::Result<()> {
-        let how = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
-        let theirs = rustix::fs::open(&self.found.theirs, how, Mode::empty())?;
-        Ok(tcflush(theirs, QueueSelector::IFlush)?)
+    /// Whether no program has it open.
+    fn is_left(&self) -> bool {
+        let left = wait_for(self.found.ours.as_fd(), PollFlags::HUP, monotonic());
+        left.is_ok_and(|ready| ready.is_some_and(|ready| ready.contains(PollFlags::HUP)))
     }
 
     /// A program that is still there sent what is no request: what follows is none either, until it pauses.
     fn wait_for_a_pause(&self) {
-        let mut lost = [0; 1_024];
-        while matches!(self.wait(QUIET), Heard::Bytes) {
-            // What cannot be read is not there.
-            let _ = rustix::io::read(&**self.found.ours, &mut lost);
+        let closed = self.found.openings.closed();
+        loop {
+            match self.wait(QUIET) {
+                Heard::Bytes => self.throw_away(),
+                Heard::Opening if self.found.openings.closed() == closed => {}
+                Heard::Opening | Heard::Left | Heard::Nothing | Heard::Closing => return,
+            }
         }
     }
 
-    /// Waits until a program opens it, or it is closed. An opening that was told before is waited for no more.
-    fn wait_for_an_opening(&self) {
-        let openings = PollFd::from_borrowed_fd(self.found.openings.as_fd(), PollFlags::IN);
-        // A failure is seen again by who waits for bytes.
-        let _ = wait_for_any(&mut [openings, self.closing.waiting()], far(NEVER));
-        let mut told = [0; 1_024];
-        while rustix::io::read(&*self.found.openings, &mut told).is_ok_and(|bytes| bytes > 0) {}
+    fn throw_away(&self) {
+        let mut lost = [0; 1_024];
+        // What cannot be read is not there.
+        let _ = rustix::io::read(&**self.found.ours, &mut lost);
     }
 
     fn wait(&self, within: Duration) -> Heard {
         let ours = PollFd::from_borrowed_fd(self.found.ours.as_fd(), PollFlags::IN);
-        match wait_for_any(&mut [ours, self.closing.waiting()], far(within)) {
-            Ok(Some([_, closing])) if !closing.is_empty() => Heard::Closing,
-            Ok(Some([ours, _])) if ours.contains(PollFlags::IN) => Heard::Bytes,
-            Ok(Some(_)) => Heard::Left,
+        match wait_for_any(&mut [ours, self.found.openings.waiting(), self.closing.waiting()], far(within)) {
+            Ok(Some([_, _, closing])) if !closing.is_empty() => Heard::Closing,
+            Ok(Some([ours, ..])) if ours.contains(PollFlags::IN) => Heard::Bytes,
+            Ok(Some([ours, ..])) if !ours.is_empty() => Heard::Left,
+            Ok(Some(_)) => Heard::Opening,
             Ok(None) | Err(_) => Heard::Nothing,
         }
     }
@@ -139,6 +144,8 @@ impl TerminalDoor {
 /// What is there at the door.
 enum Heard {
     Bytes,
+    /// Somebody opened it, or closed it.
+    Opening,
     /// No program has it open.
     Left,
     Nothing,
