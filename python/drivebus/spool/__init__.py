@@ -9,9 +9,9 @@ from drivebus.lazy_names import later
 
 if TYPE_CHECKING:
     from drivebus.spool.layout import Layout
-    from drivebus.spool.store import Reader, Spool, Spooled
+    from drivebus.spool.store import Reader, Spool, Spooled, Stretch
 
-__all__ = ["Layout", "Reader", "Spool", "Spooled"]
+__all__ = ["Layout", "Reader", "Spool", "Spooled", "Stretch"]
 
 if not TYPE_CHECKING:
-    __getattr__ = later(__name__, {"layout": ("Layout",), "store": ("Reader", "Spool", "Spooled")})
+    __getattr__ = later(__name__, {"layout": ("Layout",), "store": ("Reader", "Spool", "Spooled", "Stretch")})

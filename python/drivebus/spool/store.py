@@ -16,11 +16,12 @@ from typing import NamedTuple
 
 from drivebus.errors import NotAllowed
 from drivebus.spool.layout import Layout
+from drivebus.spool.owner import owned
 from drivebus.spool.proof import is_proven, proof_of
 from drivebus.spool.salvage import salvage
 from drivebus.values import Value
 
-__all__ = ["Reader", "Spool", "Spooled"]
+__all__ = ["Reader", "Spool", "Spooled", "Stretch"]
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS epoch (number INTEGER PRIMARY KEY AUTOINCREMENT, name TEXT NOT NULL UNIQUE);
@@ -64,6 +65,20 @@ class Spooled(NamedTuple):
     values: tuple[Value, ...]
 
 
+class Stretch(NamedTuple):
+    """What the file has of one epoch.
+
+    Attributes:
+        epoch: Its name.
+        first: The number of its first sample.
+        last: The number of its last one.
+    """
+
+    epoch: str
+    first: int
+    last: int
+
+
 class _New(NamedTuple):
     """A sample that is not in the file yet."""
 
@@ -101,7 +116,12 @@ class Spool:
         self._lost = 0
         self._why = ""
         self._closing = threading.Event()
-        self._base = _opened(path, tell)
+        self._owned = owned(path)
+        try:
+            self._base = _opened(path, tell)
+        except BaseException:
+            self._owned.close()
+            raise
         [(self._epoch,)] = self._base.execute(
             "INSERT INTO epoch (name) VALUES (?) RETURNING number", (secrets.token_hex(8),)
         ).fetchall()
@@ -142,9 +162,13 @@ class Spool:
         return self._lost
 
     def wait(self, after: int, timeout: float) -> bool:
-        """Waits for a sample behind number *after*, for *timeout* seconds at most; whether there is one."""
+        """Waits for a sample behind number *after*, for *timeout* seconds at most; whether there is one.
+
+        When this is closed, nobody waits any longer.
+        """
         with self._came:
-            return self._came.wait_for(lambda: self._last > after or self._closing.is_set(), timeout)
+            self._came.wait_for(lambda: self._last > after or self._closing.is_set(), timeout)
+            return self._last > after
 
     def commit(self) -> None:
         """Writes down what is to be kept. Once a second it happens by itself."""
@@ -163,10 +187,16 @@ class Spool:
                     self._give_way()
                 self._complain(str(error))
                 return
-            self._complain("")
             with self._came:
                 self._last = last
                 self._came.notify_all()
+            # Those samples are in the file. Whatever comes of the old ones, they must not be written again.
+            try:
+                self._make_room()
+            except sqlite3.Error as error:
+                self._complain(str(error))
+            else:
+                self._complain("")
 
     def _give_way(self) -> None:
         """The oldest of those that the disk does not take, beyond as many as are kept in memory."""
@@ -197,8 +227,7 @@ class Spool:
                 [(*row, proof_of(*row)) for row in rows],
             )
             base.executemany("INSERT OR REPLACE INTO position VALUES (?, ?)", reached.items())
-        [(last,)] = base.execute("SELECT seq FROM sqlite_sequence WHERE name = 'sample'").fetchall() or [(0,)]
-        self._make_room()
+            [(last,)] = base.execute("SELECT seq FROM sqlite_sequence WHERE name = 'sample'").fetchall() or [(0,)]
         return int(last)
 
     def _layout(self, layout: Layout) -> int:
@@ -230,6 +259,7 @@ class Spool:
         self._thread.join()
         self.commit()
         self._base.close()
+        self._owned.close()
 
     def __enter__(self) -> Spool:
         return self
@@ -267,6 +297,25 @@ class Reader:
         )
         return [self._sample(*row[:-1]) for row in rows.fetchall() if is_proven(row)]
 
+    def stretches(self) -> list[Stretch]:
+        """What the file has of each epoch, the oldest first."""
+        # Samples of later epochs have higher numbers, so the ends are searched for, and not all samples read.
+        found: list[Stretch] = []
+        with self._base as base:
+            base.execute("BEGIN")
+            [(newest,)] = base.execute("SELECT max(seq) FROM sample").fetchall()
+            here = self._at_or_behind(0)
+            while here is not None:
+                first, epoch = here
+                last, beyond = first, newest + 1
+                while beyond - last > 1:
+                    middle = (last + beyond) // 2
+                    there = self._at_or_behind(middle)
+                    last, beyond = (middle, beyond) if there and there[1] == epoch else (last, middle)
+                found.append(Stretch(self._epoch(epoch), first, last))
+                here = self._at_or_behind(beyond)
+        return found
+
     def wait(self, seq: int, timeout: float) -> bool:
         """Waits for a sample behind number *seq*, for *timeout* seconds at most; whether there is one."""
         return self._spool.wait(seq, timeout)
@@ -285,12 +334,21 @@ class Reader:
         if layout not in self._layouts:
             [(told,)] = self._base.execute("SELECT told FROM layout WHERE number = ?", (layout,)).fetchall()
             self._layouts[layout] = Layout.of_text(told)
-        if epoch not in self._epochs:
-            [(self._epochs[epoch],)] = self._base.execute(
-                "SELECT name FROM epoch WHERE number = ?", (epoch,)
-            ).fetchall()
         known = self._layouts[layout]
-        return Spooled(seq, self._epochs[epoch], known, at, took, missing, () if missing else known.values(packed))
+        return Spooled(seq, self._epoch(epoch), known, at, took, missing, () if missing else known.values(packed))
+
+    def _epoch(self, number: int) -> str:
+        if number not in self._epochs:
+            [(name,)] = self._base.execute("SELECT name FROM epoch WHERE number = ?", (number,)).fetchall()
+            self._epochs[number] = name
+        return self._epochs[number]
+
+    def _at_or_behind(self, seq: int) -> tuple[int, int] | None:
+        """The first sample with number *seq* or a higher one: its number, and the number of its epoch."""
+        found: tuple[int, int] | None = self._base.execute(
+            "SELECT seq, epoch FROM sample WHERE seq >= ? ORDER BY seq LIMIT 1", (seq,)
+        ).fetchone()
+        return found
 
 
 def _connected(path: Path) -> sqlite3.Connection:
