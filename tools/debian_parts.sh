@@ -1,7 +1,7 @@
 #!/bin/sh
 # Brings mbpoll, libmodbus and LinuxCNC's HAL, which the interop tests talk to, tshark, which reads captures, valgrind,
-# which counts instructions, strace, which writes down system calls, and Prometheus, which scrapes metrics, into .tools/
-# without touching the system.
+# which counts instructions, strace, which writes down system calls, PostgreSQL, which samples are delivered to, and
+# Prometheus, which scrapes metrics, into .tools/ without touching the system.
 #
 # Needs no root: packages are downloaded and unpacked, not installed. Where apt is not there it says what is missing,
 # and the checks that need it are skipped (with CI=true they fail).
@@ -28,14 +28,19 @@ have_hal() {
     [ "$(uname -s)" != Linux ] || command -v halrun >/dev/null 2>&1 || [ -x "$tools/linuxcnc/usr/bin/halrun" ]
 }
 have_prometheus() { command -v promtool >/dev/null 2>&1 || [ -x "$tools/usr/bin/promtool" ]; }
+# Debian has the server's programs beside the path, in a folder for each version.
+have_postgres() {
+    command -v initdb >/dev/null 2>&1 || ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 ||
+        ls "$tools"/usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1
+}
 have_all() {
-    have_program && have_library && have_valgrind && have_strace && have_tshark && have_hal && have_prometheus
+    have_program && have_library && have_valgrind && have_strace && have_tshark && have_postgres && have_prometheus && have_hal
 }
 lacking() {
-    echo "of mbpoll, libmodbus, tshark, valgrind, strace, Prometheus and LinuxCNC some are missing ($1); the checks that need" >&2
-    echo "them will be skipped." >&2
-    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 tshark valgrind strace linuxcnc-uspace prometheus" >&2
-    echo "    macOS:           brew install libmodbus wireshark, and mbpoll from its source" >&2
+    echo "of mbpoll, libmodbus, tshark, valgrind, strace, PostgreSQL, Prometheus and LinuxCNC some are missing ($1); the checks" >&2
+    echo "that need them will be skipped." >&2
+    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 tshark valgrind strace postgresql prometheus linuxcnc-uspace" >&2
+    echo "    macOS:           brew install libmodbus wireshark postgresql prometheus, and mbpoll from its source" >&2
     exit 0
 }
 
@@ -45,8 +50,9 @@ have_program && have_library || packages="mbpoll libmodbus5"
 have_valgrind || packages="$packages valgrind"
 have_strace || packages="$packages strace libunwind8"
 have_prometheus || packages="$packages prometheus"
-wants_tshark=
-have_tshark || wants_tshark=yes
+large=
+have_tshark || large=tshark
+have_postgres || large="$large postgresql"
 command -v apt-get >/dev/null 2>&1 && command -v dpkg >/dev/null 2>&1 || lacking "no apt here"
 
 mkdir -p "$tools/apt/lists/partial" "$tools/apt/cache/archives/partial" "$tools/apt/debs"
@@ -55,14 +61,14 @@ cd "$tools/apt/debs" || exit 1
 as_is="-q -o APT::Sandbox::User=root -o Acquire::Retries=5"
 # Where the system's package lists are empty or old: lists of our own.
 own="$as_is -o Dir::State::lists=$tools/apt/lists -o Dir::Cache=$tools/apt/cache"
-# tshark needs libraries of its own: those that apt would install with it here.
-with_libraries() { apt-get "$@" -s install --no-install-recommends tshark 2>/dev/null | awk '/^Inst/ { print $2 }'; }
+# tshark and PostgreSQL need libraries of their own: those that apt would install with them here.
+with_libraries() { apt-get -s install --no-install-recommends "$@" 2>/dev/null | awk '/^Inst/ { print $2 }'; }
 # shellcheck disable=SC2086  # options, to be split
-if [ -n "$wants_tshark" ]; then
-    found=$(with_libraries $as_is)
-    [ -n "$found" ] || { apt-get $own update >/dev/null && found=$(with_libraries $own); }
+for package in $large; do
+    found=$(with_libraries $as_is "$package")
+    [ -n "$found" ] || { apt-get $own update >/dev/null && found=$(with_libraries $own "$package"); }
     packages="$packages $found"
-fi
+done
 wants_hal=
 have_hal || wants_hal=linuxcnc-uspace
 # halcmd reads its lines by libedit, which not every system has.

@@ -1,4 +1,8 @@
-"""Where samples go: programs of others, each at a pace of its own. None of them can hold a line up."""
+"""Where samples go: databases and programs of others, each at a pace of its own. None of them can hold a line up.
+
+`delivery` is the loop of every sink that takes what waits in a spool, `lanes` says what is next, and `intervals` what is
+in already. `picture` is how a plant is now, for those who come and ask. Each sink has files of its own beside them.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -6,15 +10,25 @@ from drivebus.lazy_names import later
 
 if TYPE_CHECKING:
     from drivebus.sinks.picture import DrivePicture, GatewayPicture, LinePicture, Picture
+    from drivebus.sinks.postgres import Postgres, PostgresSettings
     from drivebus.sinks.prometheus import Prometheus
 
-__all__ = ["DrivePicture", "GatewayPicture", "LinePicture", "Picture", "Prometheus"]
+__all__ = [
+    "DrivePicture",
+    "GatewayPicture",
+    "LinePicture",
+    "Picture",
+    "Postgres",
+    "PostgresSettings",
+    "Prometheus",
+]
 
 if not TYPE_CHECKING:
     __getattr__ = later(
         __name__,
         {
             "picture": ("DrivePicture", "GatewayPicture", "LinePicture", "Picture"),
+            "postgres": ("Postgres", "PostgresSettings"),
             "prometheus": ("Prometheus",),
         },
     )

@@ -1,0 +1,48 @@
+"""Which numbers of an epoch are in, as intervals that grow together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+__all__ = ["Change", "Intervals"]
+
+
+class Change(NamedTuple):
+    """What an added interval changes.
+
+    Attributes:
+        gone: The intervals that it has grown together with.
+        come: The one that stands there now.
+    """
+
+    gone: tuple[tuple[int, int], ...]
+    come: tuple[int, int]
+
+
+class Intervals:
+    """Intervals of whole numbers, first and last, both of them in."""
+
+    def __init__(self, intervals: Iterable[tuple[int, int]] = ()) -> None:
+        self._all = sorted(intervals)
+
+    def __iter__(self) -> Iterator[tuple[int, int]]:
+        return iter(self._all)
+
+    def add(self, first: int, last: int) -> Change:
+        """All from *first* to *last* are in."""
+        gone = tuple(each for each in self._all if each[0] <= last + 1 and each[1] >= first - 1)
+        come = (min([first, *(each[0] for each in gone)]), max([last, *(each[1] for each in gone)]))
+        self._all = sorted([*(each for each in self._all if each not in gone), come])
+        return Change(gone, come)
+
+    def missing(self, first: int, last: int) -> Iterator[tuple[int, int]]:
+        """The intervals between *first* and *last* that are not in."""
+        for begin, end in self._all:
+            if begin > last:
+                break
+            if first < begin:
+                yield first, begin - 1
+            first = max(first, end + 1)
+        if first <= last:
+            yield first, last

@@ -1,0 +1,244 @@
+"""The PostgreSQL sink at a real server: each sample once, whatever ends, breaks or is cut in between."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import closing
+from itertools import count
+from pathlib import Path
+
+import pytest
+
+from drivebus.sinks import Postgres, PostgresSettings, delivery
+from drivebus.spool import Layout, Spool
+
+if sys.platform == "win32":
+    pytest.skip("the server of these tests has a Unix socket", allow_module_level=True)
+pytest.importorskip("psycopg")
+
+from .delivering import LAYOUT, SIZE, Rows, delivered, delivering, equal, feed, held, is_in, quiet, quoted
+from .postgres_server import ROOT, Server, Way, server, until
+
+_NUMBERS = count(1)
+
+
+@pytest.fixture(scope="module")
+def postgres() -> Iterator[Server]:
+    with server() as made:
+        yield made
+
+
+@pytest.fixture
+def schema() -> str:
+    """One for each test."""
+    return f"plant {next(_NUMBERS)}"
+
+
+@pytest.fixture
+def spool(tmp_path: Path) -> Iterator[Spool]:
+    with Spool(tmp_path / "spool", SIZE, quiet) as spool:
+        yield spool
+
+
+@pytest.fixture
+def way(postgres: Server) -> Iterator[Way]:
+    folder = Path(tempfile.mkdtemp(prefix="drivebus-way-"))
+    with closing(Way(folder, postgres.folder)) as made:
+        yield made
+    shutil.rmtree(folder)
+
+
+@pytest.fixture(autouse=True)
+def _soon_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(delivery, "_FIRST_PAUSE", 0.01)
+    monkeypatch.setattr(delivery, "_LONGEST_PAUSE", 0.05)
+    monkeypatch.setattr(delivery, "_LOOKS", 0.02)
+
+
+def pause(longest: float) -> None:
+    """Some time, so that what follows comes at any moment. Nothing is judged by it."""
+    threading.Event().wait(random.random() * longest)
+
+
+def test_each_sample_is_a_row(spool: Spool, postgres: Server, schema: str) -> None:
+    told: list[str] = []
+    with delivering(spool, postgres, schema, told.append) as sink:
+        feed(spool, 1000)
+    assert not told
+    assert sink.status()["delivered"] == 1000
+    equal(spool, postgres, schema)
+    narrow = f"FROM {quoted(schema)}.narrow WHERE"
+    assert postgres.ask(f"SELECT DISTINCT name {narrow} gateway = 'gateway 1' ORDER BY name") == [
+        ("0x3000",),
+        ("output_current",),
+        ("set speed",),
+    ]
+    at = "time = to_timestamp(1.7e9 + 0.25)"
+    assert postgres.ask(f"SELECT drive, name, value {narrow} {at} ORDER BY value") == [
+        ("pump", "output_current", 0.1),
+        ("pump", "set speed", 1.1),
+        ("pump", "0x3000", 2.1),
+    ]
+    units = "SELECT attname, col_description(attrelid, attnum) FROM pg_attribute WHERE attrelid = %s::regclass"
+    comments = dict(postgres.ask(units, f"{quoted(schema)}.gd350"))
+    assert (comments["output_current"], comments["set speed"], comments["0x3000"]) == ("A", "rpm", None)
+
+
+def test_who_has_all_goes_on_behind_it(spool: Spool, postgres: Server, schema: str) -> None:
+    for _ in range(3):
+        with delivering(spool, postgres, schema) as sink:
+            feed(spool, 10)
+        assert sink.status()["delivered"] == 10
+    equal(spool, postgres, schema)
+    spool.commit()
+    with closing(spool.reader("postgres")) as reader:
+        assert reader.position() == 30
+
+
+def test_columns_are_added_and_each_family_has_a_table(spool: Spool, postgres: Server, schema: str) -> None:
+    more = Layout("fan", "gd350", (*LAYOUT.names, "torque"), (*LAYOUT.units, "%"), (*LAYOUT.digits, 1))
+    nameless = Layout("mill", "", ("0x3001",), ("",), (0,))
+    with delivering(spool, postgres, schema):
+        feed(spool, 20)
+        until(lambda: postgres.ask("SELECT to_regclass(%s)", f"{quoted(schema)}.gd350") != [(None,)])
+        feed(spool, 20, more)
+        feed(spool, 20, nameless)
+    assert len(delivered(postgres, schema)) == 40
+    assert len(delivered(postgres, schema, nameless, "unknown")) == 20
+    torque = f"SELECT DISTINCT drive FROM {quoted(schema)}.narrow WHERE name = 'torque'"
+    assert postgres.ask(torque) == [("fan",)]
+
+
+NAMES = (
+    'Robert"); DROP TABLE x;--',
+    "$(reboot)",
+    "two\nlines",
+    "100 %s",
+    "time",
+    "xmin",
+    "x" * 70,
+    "x" * 71,
+    "ü" * 40,
+    "",
+)
+
+
+def test_any_name_is_a_name(spool: Spool, postgres: Server) -> None:
+    schema = 'my "schema"'
+    layout = Layout(NAMES[0], NAMES[0] + "\n\0", NAMES, ("m³/h' --",) * len(NAMES), (1,) * len(NAMES))
+    reserved = Layout("\0", "reached", ("value",), ("\\",), (0,))
+    with delivering(spool, postgres, schema):
+        feed(spool, 9, layout)
+        feed(spool, 9, reserved)
+    narrow = postgres.ask(f"SELECT drive, count(DISTINCT name) FROM {quoted(schema)}.narrow GROUP BY 1")
+    assert dict(narrow) == {"\N{REPLACEMENT CHARACTER}": 1, NAMES[0]: len(NAMES)}
+    columns = {name for (name,) in postgres.ask(f"SELECT DISTINCT name FROM {quoted(schema)}.narrow")}
+    assert set(NAMES[:4]) < columns
+    assert max(len(name.encode()) for name in columns) == 63
+
+
+def test_connections_that_are_ended_at_any_moment(spool: Spool, postgres: Server, schema: str) -> None:
+    end = "SELECT count(pg_terminate_backend(pid)) FROM pg_stat_activity WHERE application_name = 'drivebus gateway 1'"
+    with delivering(spool, postgres, schema):
+        ended = 0
+        while ended < 40:
+            feed(spool, 50)
+            pause(0.03)
+            ended += postgres.ask(end)[0][0]
+    equal(spool, postgres, schema)
+
+
+def test_a_server_that_is_stopped_at_once_at_any_moment(spool: Spool, postgres: Server, schema: str) -> None:
+    told: list[str] = []
+    with delivering(spool, postgres, schema, told.append):
+        for _ in range(5):
+            for _ in range(random.randrange(1, 10)):
+                feed(spool, 50)
+                pause(0.02)
+            postgres.stop_at_once()
+            feed(spool, 50)
+            postgres.start()
+    equal(spool, postgres, schema)
+    assert told
+
+
+def test_commits_whose_answer_is_lost(spool: Spool, postgres: Server, way: Way, schema: str) -> None:
+    way.cut = lambda: random.random() < 0.5
+    with delivering(spool, way, schema) as sink:
+        while way.broken < 40:
+            feed(spool, 20)
+            pause(0.02)
+        way.cut = None
+    equal(spool, postgres, schema)
+    assert sink.status()["delivered"] <= spool.last
+
+
+def test_a_program_that_is_killed_at_any_moment(tmp_path: Path, postgres: Server, schema: str) -> None:
+    path = tmp_path / "spool"
+    command = [sys.executable, "-m", "tests.python.delivering", postgres.conninfo, schema, str(path)]
+    with subprocess.Popen(
+        command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ}
+    ) as program:
+        assert program.stdin is not None
+        assert program.stdout is not None
+        for _ in range(20):
+            program.stdin.write("\n")
+            program.stdin.flush()
+            lines = [program.stdout.readline() for _ in range(random.randrange(2, 12))]
+            pause(0.03)
+            [number] = [line for line in lines if line.strip().isdigit()]
+            os.kill(int(number), signal.SIGKILL)
+            while program.stdout.readline() != "ended\n":
+                pass
+        program.stdin.close()
+    with Spool(path, SIZE, quiet) as spool, closing(spool.reader("test")) as reader:
+        with Postgres(spool, PostgresSettings(postgres.conninfo, "killed", schema), quiet) as sink:
+            until(lambda: is_in(sink))
+        rows = held(reader)
+        assert len({epoch for epoch, _ in rows}) > 10
+        assert delivered(postgres, schema) == rows
+
+
+def test_a_spool_that_is_cut_anywhere(tmp_path: Path, postgres: Server, schema: str) -> None:
+    path, log = tmp_path / "spool", tmp_path / "spool-wal"
+    everything: Rows = {}
+    for _ in range(100):
+        with Spool(path, SIZE, quiet) as spool, closing(spool.reader("test")) as reader:
+            feed(spool, 10)
+            with delivering(spool, postgres, schema):
+                pass
+            everything |= held(reader)
+            # These are not delivered, and may be there when it was cut.
+            feed(spool, 10)
+            kept = {each: each.read_bytes() for each in (path, log)}
+        cut = random.choice([path, log])
+        kept[cut] = kept[cut][: random.randrange(len(kept[cut]) + 1)]
+        for each, data in kept.items():
+            each.write_bytes(data)
+    assert delivered(postgres, schema) == everything
+    assert len({epoch for epoch, _ in everything}) == 100
+
+
+def test_the_present_goes_before_the_backlog(
+    spool: Spool, postgres: Server, schema: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # So that the backlog takes hundreds of transactions.
+    monkeypatch.setattr(delivery, "_BEGINS_WITH", 10)
+    monkeypatch.setattr(delivery, "_MOST", 10)
+    feed(spool, 3000)
+    newest = f"SELECT first FROM {quoted(schema)}.reached WHERE last = 3001"
+    with delivering(spool, postgres, schema) as sink:
+        until(lambda: sink.status()["delivered"])
+        feed(spool, 1)
+        until(lambda: postgres.ask(newest))
+        assert postgres.ask(newest) == [(3001,)]
+        assert sink.status()["behind"] > 0
+    equal(spool, postgres, schema)
