@@ -6,6 +6,7 @@ import os
 import random
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -240,3 +241,17 @@ def test_what_cannot_be_opened_is_said(tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir()
     with pytest.raises(NotAllowed, match="cannot be opened"):
         Spool(tmp_path / "folder", 1 << 30, told)
+
+
+def test_a_sample_that_is_not_as_it_was_written_is_told_and_gives_no_values(tmp_path: Path) -> None:
+    with Spool(tmp_path / "spool", 1 << 30, told) as spool:
+        for turn in range(3):
+            spool.add(PUMP, float(turn), 0.02, "", [1, 2, 3])
+        spool.commit()
+    base = sqlite3.connect(tmp_path / "spool")
+    base.execute("UPDATE sample SET packed = zeroblob(13) WHERE seq = 2")
+    base.commit()
+    base.close()
+    with Spool(tmp_path / "spool", 1 << 30, told) as spool:
+        assert [each.missing for each in all_of(spool)] == ["", "damaged in the spool", ""]
+        assert [each.values for each in all_of(spool)] == [(1, 2, 3), (), (1, 2, 3)]

@@ -15,11 +15,11 @@ from drivebus.drive import Drive
 from drivebus.errors import DrivebusError, NotAllowed
 from drivebus.gateway import Allow, Gateway, GatewayStats
 from drivebus.latch import Latch
-from drivebus.service.check import check
+from drivebus.service.mistakes import check, settings_of
 from drivebus.service.notify import notify, watchdog_interval
 from drivebus.service.polling import Polling
 from drivebus.service.status import StatusFile
-from drivebus.sinks import GatewayPicture, LinePicture, Picture, Prometheus
+from drivebus.sinks import GatewayPicture, LinePicture, Picture, Postgres, Prometheus
 from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SiteLine
 from drivebus.spool import Spool
 
@@ -57,6 +57,9 @@ class Service:
             name: [each for each in site.share.gateways if each.line == line] for name, line in site.lines.items()
         }
         self._spool = _spool_of(site, tell)
+        self._postgres = None
+        if site.postgres is not None and self._spool is not None:
+            self._postgres = Postgres(self._spool, settings_of(site.postgres), tell)
         self._lines = [
             _Served(site, line, of_line[name], tell, self._over, self._spool) for name, line in site.lines.items()
         ]
@@ -70,6 +73,8 @@ class Service:
                 thread.start()
             for line in self._lines:
                 line.tried.wait()
+            if self._postgres is not None:
+                self._postgres.start()
             notify("READY=1")
             self._watch(status, None if duration is None else time.monotonic() + duration)
         finally:
@@ -79,6 +84,8 @@ class Service:
                 self._metrics.close()
             for thread in threads:
                 thread.join()
+            if self._postgres is not None:
+                self._postgres.close()
             if self._spool is not None:
                 self._spool.close()
             with suppress(OSError):
@@ -131,6 +138,7 @@ class Service:
             "process": os.getpid(),
             "file": str(self._site.path),
             "lines": {line.name: line.status() for line in self._lines},
+            "postgres": None if self._postgres is None else self._postgres.status(),
             "spool": None if self._spool is None else {"last": self._spool.last, "lost": self._spool.lost},
         }
 

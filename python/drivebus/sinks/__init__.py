@@ -1,7 +1,7 @@
 """Where samples go: databases and programs of others, each at a pace of its own. None of them can hold a line up.
 
-`delivery` is the loop of every sink that takes what waits in a spool, `lanes` says what is next, and `intervals` what is
-in already. `picture` is how a plant is now, for those who come and ask. Each sink has files of its own beside them.
+`delivery` is the loop of every sink that takes what waits in a spool, `lanes` says what is next, `intervals` what is in
+already. `picture` is how a plant is now, for those who come and ask. Each sink has files of its own beside them.
 """
 
 from typing import TYPE_CHECKING

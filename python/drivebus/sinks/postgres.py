@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivebus.errors import NotAllowed
 from drivebus.sinks.delivery import Delivery
 from drivebus.spool import Spool
+
+if TYPE_CHECKING:
+    from drivebus.sinks.postgres_session import Session
 
 __all__ = ["Postgres", "PostgresSettings"]
 
@@ -48,12 +51,16 @@ class Postgres:
     """
 
     def __init__(self, spool: Spool, settings: PostgresSettings, tell: Callable[[str], None]) -> None:
-        try:
-            from drivebus.sinks.postgres_session import Session
-        except ImportError as error:
-            raise NotAllowed(f"PostgreSQL needs {error.name or 'libpq'}: pip install 'drivebus[postgres]'") from None
-        session = Session(settings.conninfo, settings.gateway, settings.schema, settings.password_file)
-        self._delivery = Delivery(spool, "postgres", session, tell)
+        self._delivery = Delivery(spool, "postgres", _session(settings), tell)
+
+    @staticmethod
+    def check(settings: PostgresSettings) -> None:
+        """Whether *settings* can be. Nothing is connected.
+
+        Raises:
+            NotAllowed: They cannot, or psycopg is not installed.
+        """
+        _session(settings)
 
     def start(self) -> None:
         """Begins to deliver, in a thread of its own."""
@@ -73,3 +80,11 @@ class Postgres:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _session(settings: PostgresSettings) -> Session:
+    try:
+        from drivebus.sinks.postgres_session import Session
+    except ImportError as error:
+        raise NotAllowed(f"PostgreSQL needs {error.name or 'libpq'}: pip install 'drivebus[postgres]'") from None
+    return Session(settings.conninfo, settings.gateway, settings.schema, settings.password_file)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from drivebus.site.known_families import families_on, forget, known_family, remember
     from drivebus.site.polls import SitePoll, SiteSpool
     from drivebus.site.share import SiteAllow, SiteGateway, SiteShare
-    from drivebus.site.sinks import SitePrometheus
+    from drivebus.site.sinks import SitePostgres, SitePrometheus
     from drivebus.site.state_folder import state_file
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "SiteGateway",
     "SiteLine",
     "SitePoll",
+    "SitePostgres",
     "SitePrometheus",
     "SiteShare",
     "SiteSpool",
@@ -40,7 +41,7 @@ if not TYPE_CHECKING:
             "known_families": ("families_on", "forget", "known_family", "remember"),
             "polls": ("SitePoll", "SiteSpool"),
             "share": ("SiteAllow", "SiteShare", "SiteGateway"),
-            "sinks": ("SitePrometheus",),
+            "sinks": ("SitePostgres", "SitePrometheus"),
             "state_folder": ("state_file",),
         },
     )

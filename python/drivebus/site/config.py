@@ -32,7 +32,7 @@ from drivebus.site.entries import SiteDrive, SiteLine
 from drivebus.site.polls import SitePoll, SiteSpool, polls_of, spool_of
 from drivebus.site.reading import Reading, Wrong, flag, one_of, quoted, text, texts, whole
 from drivebus.site.share import SiteShare, share_of
-from drivebus.site.sinks import SitePrometheus, prometheus_of
+from drivebus.site.sinks import SitePostgres, SitePrometheus, postgres_of, prometheus_of
 
 __all__ = ["FILE", "Site"]
 
@@ -40,7 +40,7 @@ FILE = "drivebus.toml"
 """What the file is called."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
-_SECTIONS = ("lines", "drives", "groups", "share", "poll", "spool", "prometheus")
+_SECTIONS = ("lines", "drives", "groups", "share", "poll", "spool", "prometheus", "postgres")
 _LARGEST = 1_000_000
 """Bytes that such a file may have."""
 
@@ -58,6 +58,7 @@ class Site:
         polls: What a service asks the drives again and again.
         spool: Where it keeps what they say until others have it.
         prometheus: Where Prometheus finds how they are.
+        postgres: Where their samples go.
     """
 
     path: Path
@@ -68,6 +69,7 @@ class Site:
     polls: tuple[SitePoll, ...] = ()
     spool: SiteSpool | None = None
     prometheus: SitePrometheus | None = None
+    postgres: SitePostgres | None = None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Site:
@@ -123,9 +125,9 @@ class _Reader:
         groups = self._groups(drives)
         share = share_of(self._file, lines, drives, groups)
         polls, spool = polls_of(self._file, drives, groups), spool_of(self._file)
-        prometheus = prometheus_of(self._file)
+        prometheus, postgres = prometheus_of(self._file), postgres_of(self._file)
         self._file.finish()
-        return Site(self._file.path, lines, drives, groups, share, polls, spool, prometheus)
+        return Site(self._file.path, lines, drives, groups, share, polls, spool, prometheus, postgres)
 
     def _tables(self, section: str, read: Callable[[str, dict[str, Any]], Any]) -> Iterator[tuple[str, Any]]:
         """Each table in *section*, as *read* makes it."""

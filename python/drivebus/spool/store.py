@@ -39,6 +39,8 @@ _AT_A_TIME = 20
 """Of so many parts of a full file, the oldest goes."""
 _PATIENCE = 10.0
 """Seconds that a commit waits for another program that looks into the file."""
+_NOTHING = Layout("", "", (), (), ())
+"""What a damaged sample has."""
 _NO_NUMBER = 1 << 62
 """No sample has such a number."""
 
@@ -295,7 +297,7 @@ class Reader:
             " ORDER BY seq LIMIT ?",
             (seq, _NO_NUMBER if before is None else before, limit),
         )
-        return [self._sample(*row[:-1]) for row in rows.fetchall() if is_proven(row)]
+        return [self._sample(*row[:-1]) if is_proven(row) else self._damaged(*row[:2]) for row in rows.fetchall()]
 
     def stretches(self) -> list[Stretch]:
         """What the file has of each epoch, the oldest first."""
@@ -337,10 +339,14 @@ class Reader:
         known = self._layouts[layout]
         return Spooled(seq, self._epoch(epoch), known, at, took, missing, () if missing else known.values(packed))
 
+    def _damaged(self, seq: int, epoch: int) -> Spooled:
+        """A sample that is not as it was written. Its number is kept, so that nobody waits for it."""
+        return Spooled(seq, self._epoch(epoch), _NOTHING, 0.0, 0.0, "damaged in the spool", ())
+
     def _epoch(self, number: int) -> str:
         if number not in self._epochs:
-            [(name,)] = self._base.execute("SELECT name FROM epoch WHERE number = ?", (number,)).fetchall()
-            self._epochs[number] = name
+            found = self._base.execute("SELECT name FROM epoch WHERE number = ?", (number,)).fetchone()
+            self._epochs[number] = "" if found is None else found[0]
         return self._epochs[number]
 
     def _at_or_behind(self, seq: int) -> tuple[int, int] | None:

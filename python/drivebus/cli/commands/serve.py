@@ -90,6 +90,9 @@ def _show(session: Session, status: dict[str, Any]) -> None:
             )
         for hint in line["hints"]:
             session.out.say(f"{name}: {hint}")
+    if (postgres := status["postgres"]) is not None:
+        how = "connected" if postgres["connected"] else f"not connected: {postgres['why']}"
+        session.out.say(f"PostgreSQL: {how}; {postgres['delivered']} samples delivered, {postgres['behind']} behind")
     if status["spool"] is not None:
         session.out.say(f"spool: {status['spool']['last']} samples, {status['spool']['lost']} lost")
 

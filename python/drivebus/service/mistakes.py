@@ -14,9 +14,10 @@ from drivebus.operations import network_rights
 from drivebus.operations.last_will import WAYS
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
-from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SitePoll
+from drivebus.sinks import Postgres, PostgresSettings
+from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SitePoll, SitePostgres
 
-__all__ = ["check", "hours_of"]
+__all__ = ["check", "hours_of", "settings_of"]
 
 _BYTES, _BYTES_A_VALUE = 34, 4
 """Of a sample in the spool, as it was measured."""
@@ -32,10 +33,25 @@ def check(site: Site) -> None:
     wrong |= {mistake for poll in site.polls for mistake in _of_poll(poll)}
     if site.prometheus is not None and find_spec("prometheus_client") is None:
         wrong.add((site.prometheus.at, "this needs prometheus-client: pip install 'drivebus[prometheus]'"))
+    wrong |= set(_of_postgres(site))
     if wrong:
         count = "one mistake" if len(wrong) == 1 else f"{len(wrong)} mistakes"
         told = [f"{site.path}:{line}: {reason}" for line, reason in sorted(wrong)]
         raise BadArgument("\n".join([f"{site.path} has {count}; nothing was opened:", *told]))
+
+
+def _of_postgres(site: Site) -> Iterator[tuple[int, str]]:
+    if site.postgres is None:
+        return
+    try:
+        Postgres.check(settings_of(site.postgres))
+    except NotAllowed as error:
+        yield site.postgres.at, str(error)
+
+
+def settings_of(told: SitePostgres) -> PostgresSettings:
+    """Where samples go, as the sink takes it."""
+    return PostgresSettings(told.conninfo, told.gateway, told.schema, told.password_file)
 
 
 def hours_of(site: Site) -> float | None:
