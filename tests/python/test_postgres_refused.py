@@ -193,6 +193,18 @@ def test_who_lost_what_is_in_doubles_nothing(spool: Spool, postgres: Server, sch
     equal(spool, postgres, schema)
 
 
+def test_somebody_else_who_writes_what_is_in_is_noticed(
+    spool: Spool, postgres: Server, schema: str, told: list[str]
+) -> None:
+    with delivering(spool, postgres, schema, told.append) as sink:
+        feed(spool, 30)
+        until(lambda: is_in(sink))
+        postgres.ask(f"UPDATE {schema}.reached SET last = 20")
+        feed(spool, 10)
+    assert 'somebody else writes as the gateway "gateway 1", too' in told[0]
+    equal(spool, postgres, schema)
+
+
 def test_rights_that_are_given_later(spool: Spool, postgres: Server, schema: str, told: list[str]) -> None:
     postgres.ask(f"CREATE ROLE {schema} LOGIN")
     settings = PostgresSettings(postgres.conninfo.replace("owner", schema), "gateway 1", schema)

@@ -17,7 +17,6 @@ __all__ = ["connection_string"]
 _SECRETS = ("password", "sslpassword", "oauth_client_secret")
 _UNLESS_GIVEN = {
     "connect_timeout": "10",
-    "client_encoding": "UTF8",
     # A server that is gone without a word is noticed within half a minute.
     "keepalives_idle": "10",
     "keepalives_interval": "5",
@@ -42,7 +41,7 @@ def connection_string(given: str, application: str, password_file: Path | None) 
         raise BadArgument("a password does not belong into a connection string: put it into a file of its own")
     if password_file is not None:
         told["password"] = _password(password_file)
-    settings = {**_UNLESS_GIVEN, "application_name": application, **told}
+    settings = {**_UNLESS_GIVEN, "application_name": application, **told, "client_encoding": "UTF8"}
     if "sslmode" not in told and not os.environ.get("PGSSLMODE") and not _is_local(told):
         settings["sslmode"] = "verify-full"
     return make_conninfo("", **settings)

@@ -18,7 +18,7 @@ from psycopg import errors, sql
 from drivebus.errors import NotAllowed
 from drivebus.sinks.intervals import Change, Intervals
 from drivebus.sinks.postgres_link import connection_string
-from drivebus.sinks.postgres_rows import as_copy
+from drivebus.sinks.postgres_rows import clean, write
 from drivebus.sinks.postgres_tables import Tables
 from drivebus.spool import Spooled
 
@@ -48,7 +48,7 @@ class Session:
 
     def __init__(self, conninfo: str, gateway: str, schema: str, password_file: Path | None) -> None:
         self._conninfo = conninfo
-        self._gateway = gateway
+        self._gateway = clean(gateway)
         self._schema = schema
         self._password_file = password_file
         self._connection: psycopg.Connection[Any] | None = None
@@ -130,7 +130,7 @@ class Session:
             if rest:
                 statement = sql.SQL("COPY {} ({}) FROM STDIN (FORMAT BINARY)").format(table, tables.columns(names))
                 with connection.cursor() as cursor, cursor.copy(statement) as copy:
-                    copy.write(as_copy(self._gateway, rest))
+                    write(copy, self._gateway, rest)
         connection.execute("COMMIT")
 
     def _write_down(
