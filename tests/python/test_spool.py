@@ -19,8 +19,10 @@ from drivebus.errors import NotAllowed
 from drivebus.service.changes import Changes
 from drivebus.service.polling import digits_of
 from drivebus.spool import Layout, Spool, Spooled
+from drivebus.spool.proof import proof_of
 
 PUMP = Layout("pump", "gd350", ("running_frequency", "output_current", "state"), ("Hz", "A", ""), (2, 1, 0))
+DAMAGED = "damaged in the spool"
 
 
 def told(text: str) -> None:
@@ -250,8 +252,11 @@ def test_a_sample_that_is_not_as_it_was_written_is_told_and_gives_no_values(tmp_
         spool.commit()
     base = sqlite3.connect(tmp_path / "spool")
     base.execute("UPDATE sample SET packed = zeroblob(13) WHERE seq = 2")
+    base.execute("INSERT INTO layout VALUES (9, 'no layout')")
+    row = (1, 9, 5.0, 0.02, "", b"i")
+    base.execute("INSERT INTO sample VALUES (4, ?, ?, ?, ?, ?, ?, ?)", (*row, proof_of(*row)))
     base.commit()
     base.close()
     with Spool(tmp_path / "spool", 1 << 30, told) as spool:
-        assert [each.missing for each in all_of(spool)] == ["", "damaged in the spool", ""]
-        assert [each.values for each in all_of(spool)] == [(1, 2, 3), (), (1, 2, 3)]
+        assert [each.missing for each in all_of(spool)] == ["", DAMAGED, "", DAMAGED]
+        assert [each.values for each in all_of(spool)] == [(1, 2, 3), (), (1, 2, 3), ()]

@@ -11,8 +11,9 @@ import secrets
 import sqlite3
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from drivebus.errors import NotAllowed
 from drivebus.spool.layout import Layout
@@ -297,7 +298,7 @@ class Reader:
             " ORDER BY seq LIMIT ?",
             (seq, _NO_NUMBER if before is None else before, limit),
         )
-        return [self._sample(*row[:-1]) if is_proven(row) else self._damaged(*row[:2]) for row in rows.fetchall()]
+        return [self._read(row) for row in rows.fetchall()]
 
     def stretches(self) -> list[Stretch]:
         """What the file has of each epoch, the oldest first."""
@@ -338,6 +339,12 @@ class Reader:
             self._layouts[layout] = Layout.of_text(told)
         known = self._layouts[layout]
         return Spooled(seq, self._epoch(epoch), known, at, took, missing, () if missing else known.values(packed))
+
+    def _read(self, row: tuple[Any, ...]) -> Spooled:
+        with suppress(ValueError):
+            if is_proven(row):
+                return self._sample(*row[:-1])
+        return self._damaged(*row[:2])
 
     def _damaged(self, seq: int, epoch: int) -> Spooled:
         """A sample that is not as it was written. Its number is kept, so that nobody waits for it."""
