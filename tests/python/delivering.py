@@ -108,7 +108,10 @@ def main() -> None:
     for _ in sys.stdin:
         child = os.fork()
         if child == 0:
-            _deliver(sys.argv[1], sys.argv[2], Path(sys.argv[3]))
+            try:
+                _deliver(sys.argv[1], sys.argv[2], Path(sys.argv[3]))
+            finally:
+                os._exit(1)
         print(child, flush=True)
         os.waitpid(child, 0)
         print("ended", flush=True)

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from itertools import count
 from pathlib import Path
@@ -18,15 +18,13 @@ from pathlib import Path
 import pytest
 
 from drivebus.sinks import Postgres, PostgresSettings, delivery
-from drivebus.spool import Layout, Spool
-
-if sys.platform == "win32":
-    pytest.skip("the server of these tests has a Unix socket", allow_module_level=True)
-pytest.importorskip("psycopg")
+from drivebus.sinks.postgres_session import Session
+from drivebus.spool import Layout, Spool, Spooled
 
 from .delivering import LAYOUT, SIZE, Rows, delivered, delivering, equal, feed, held, is_in, quiet, quoted
 from .postgres_server import ROOT, Server, Way, server, until
 
+CHANCE = random.Random(1)
 _NUMBERS = count(1)
 
 
@@ -65,7 +63,7 @@ def _soon_again(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def pause(longest: float) -> None:
     """Some time, so that what follows comes at any moment. Nothing is judged by it."""
-    threading.Event().wait(random.random() * longest)
+    threading.Event().wait(CHANCE.random() * longest)
 
 
 def test_each_sample_is_a_row(spool: Spool, postgres: Server, schema: str) -> None:
@@ -160,7 +158,7 @@ def test_a_server_that_is_stopped_at_once_at_any_moment(spool: Spool, postgres: 
     told: list[str] = []
     with delivering(spool, postgres, schema, told.append):
         for _ in range(5):
-            for _ in range(random.randrange(1, 10)):
+            for _ in range(CHANCE.randrange(1, 10)):
                 feed(spool, 50)
                 pause(0.02)
             postgres.stop_at_once()
@@ -173,7 +171,7 @@ def test_a_server_that_is_stopped_at_once_at_any_moment(spool: Spool, postgres: 
 @pytest.mark.parametrize("given", [1.0, 0.5])
 def test_commits_whose_answer_is_lost(spool: Spool, postgres: Server, way: Way, schema: str, given: float) -> None:
     told: list[str] = []
-    way.cut = lambda: random.random() < given
+    way.cut = lambda: CHANCE.random() < given
     with delivering(spool, way, schema, told.append):
         while way.broken < 25:
             feed(spool, 20)
@@ -195,7 +193,7 @@ def test_a_program_that_is_killed_at_any_moment(tmp_path: Path, postgres: Server
         for _ in range(20):
             program.stdin.write("\n")
             program.stdin.flush()
-            lines = [program.stdout.readline() for _ in range(random.randrange(2, 12))]
+            lines = [program.stdout.readline() for _ in range(CHANCE.randrange(2, 12))]
             pause(0.03)
             [number] = [line for line in lines if line.strip().isdigit()]
             os.kill(int(number), signal.SIGKILL)
@@ -222,8 +220,8 @@ def test_a_spool_that_is_cut_anywhere(tmp_path: Path, postgres: Server, schema: 
             # These are not delivered, and may be there when it was cut.
             feed(spool, 10)
             kept = {each: each.read_bytes() for each in (path, log)}
-        cut = random.choice([path, log])
-        kept[cut] = kept[cut][: random.randrange(len(kept[cut]) + 1)]
+        cut = CHANCE.choice([path, log])
+        kept[cut] = kept[cut][: CHANCE.randrange(len(kept[cut]) + 1)]
         for each, data in kept.items():
             each.write_bytes(data)
     assert delivered(postgres, schema) == everything
@@ -254,18 +252,55 @@ def test_a_clock_that_shows_nonsense_hinders_nothing(spool: Spool, postgres: Ser
     assert [int(year) for (year,) in years] == [9999, 9999, 1970, 9999]
 
 
-def test_the_present_goes_before_the_backlog(
-    spool: Spool, postgres: Server, schema: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # So that the backlog takes hundreds of transactions.
+@pytest.fixture
+def batches(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
+    """The first and the last number of each batch, ten samples at most, as they are delivered."""
     monkeypatch.setattr(delivery, "_BEGINS_WITH", 10)
     monkeypatch.setattr(delivery, "_MOST", 10)
-    feed(spool, 3000)
-    newest = f"SELECT first FROM {quoted(schema)}.reached WHERE last = 3001"
-    with delivering(spool, postgres, schema) as sink:
-        until(lambda: sink.status()["delivered"])
-        feed(spool, 1)
-        until(lambda: postgres.ask(newest))
-        assert postgres.ask(newest) == [(3001,)]
-        assert sink.status()["behind"] > 0
+    seen: list[tuple[int, int]] = []
+    put = Session.put
+
+    def seen_too(self: Session, samples: Sequence[Spooled]) -> None:
+        put(self, samples)
+        seen.append((samples[0].seq, samples[-1].seq))
+
+    monkeypatch.setattr(Session, "put", seen_too)
+    return seen
+
+
+def test_the_present_goes_before_what_waited(
+    spool: Spool, postgres: Server, schema: str, batches: list[tuple[int, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    feed(spool, 100)
+    put = Session.put
+
+    def come_meanwhile(self: Session, samples: Sequence[Spooled]) -> None:
+        put(self, samples)
+        if len(batches) in (2, 4):
+            feed(spool, 1)
+
+    monkeypatch.setattr(Session, "put", come_meanwhile)
+    with delivering(spool, postgres, schema):
+        pass
+    assert batches[:7] == [(1, 10), (11, 20), (101, 101), (21, 30), (102, 102), (31, 40), (41, 50)]
     equal(spool, postgres, schema)
+
+
+def test_more_than_can_be_delivered_as_it_comes_waits(
+    spool: Spool, postgres: Server, schema: str, batches: list[tuple[int, int]]
+) -> None:
+    with delivering(spool, postgres, schema) as sink:
+        until(lambda: is_in(sink))
+        feed(spool, 35)
+    assert batches == [(26, 35), (1, 10), (11, 20), (21, 25)]
+    equal(spool, postgres, schema)
+
+
+def test_over_a_long_way_as_many_samples_go_at_a_time(
+    spool: Spool, postgres: Server, schema: str, batches: list[tuple[int, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(delivery, "_SLOW", -1.0)
+    feed(spool, 40)
+    with delivering(spool, postgres, schema):
+        pass
+    assert batches == [(1, 10), (11, 20), (21, 30), (31, 40)]

@@ -4,29 +4,20 @@ from __future__ import annotations
 
 import shutil
 import socket
-import sys
+import sqlite3
 import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import closing
-from itertools import count, pairwise
+from itertools import count
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from drivebus import NotAllowed
-from drivebus.sinks import Postgres, PostgresSettings, delivery
-from drivebus.sinks.intervals import Intervals
-from drivebus.spool import Spool
-
-if sys.platform == "win32":
-    pytest.skip("the server of these tests has a Unix socket", allow_module_level=True)
-pytest.importorskip("psycopg")
-
-from drivebus.sinks import postgres_session
+from drivebus.sinks import Postgres, PostgresSettings, delivery, postgres_session
 from drivebus.sinks.postgres_link import connection_string
+from drivebus.spool import Reader, Spool
 
 from .delivering import SIZE, Rows, delivered, delivering, equal, feed, held, is_in, quiet
 from .postgres_server import SECRET, Server, Way, server, until
@@ -106,10 +97,10 @@ def test_a_server_that_is_away_is_told_once_and_tried_again(
         assert sink.status() == {"connected": False, "why": sink.status()["why"], "behind": 30, "delivered": 0}
         assert "No such file or directory" in sink.status()["why"]
         assert len(told) == 1
-        assert told[0].startswith("PostgreSQL takes no samples: connection ")
+        assert told[0].startswith("no samples reach PostgreSQL: connection ")
         with closing(Way(folder, postgres.folder)):
             until(lambda: is_in(sink))
-    assert told[1:] == ["PostgreSQL takes samples again"]
+    assert told[1:] == ["samples reach PostgreSQL again"]
     assert sink.status() == {"connected": True, "why": "", "behind": 0, "delivered": 30}
     equal(spool, postgres, schema)
 
@@ -144,7 +135,7 @@ def test_a_server_that_hangs_is_left_and_tried_again(
         until(lambda: told)
         monkeypatch.undo()
         way.is_silent = False
-    assert told[0].startswith("PostgreSQL takes no samples: the server did not answer for 0.1 s. They wait in the")
+    assert told[0].startswith("no samples reach PostgreSQL: the server did not answer for 0.1 s. They wait, and")
     equal(spool, postgres, schema)
 
 
@@ -177,7 +168,7 @@ def test_a_table_that_somebody_changed(
         postgres.ask(ruin.format(schema))
         feed(spool, 10)
     assert says in told[0]
-    assert told[1:] == ["PostgreSQL takes samples again"]
+    assert told[1:] == ["samples reach PostgreSQL again"]
     rows = delivered(postgres, schema)
     assert {seq for _, seq in rows} >= set(range(11, 21))
 
@@ -240,10 +231,25 @@ def test_a_full_disk_is_told_once(
         until(lambda: len(tried) > 5)
         postgres.ask(f"DROP TRIGGER full_disk ON {schema}.gd350")
     assert [each.split(". ")[0] for each in told] == [
-        "PostgreSQL takes no samples: its disk is full",
-        "PostgreSQL takes samples again",
+        "no samples reach PostgreSQL: its disk is full",
+        "samples reach PostgreSQL again",
     ]
     equal(spool, postgres, schema)
+
+
+def test_a_spool_that_cannot_be_read_is_named(
+    spool: Spool, postgres: Server, schema: str, told: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def damaged(*_: object) -> NoReturn:
+        raise sqlite3.DatabaseError("database disk image is malformed")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Reader, "after", damaged)
+        with Postgres(spool, PostgresSettings(postgres.conninfo, "gateway 1", schema), told.append):
+            until(lambda: told)
+    assert told[0].startswith(
+        "no samples reach PostgreSQL: the spool cannot be read: database disk image is malformed."
+    )
 
 
 def test_a_table_of_somebody_else_is_left_alone(spool: Spool, postgres: Server, schema: str, told: list[str]) -> None:
@@ -307,83 +313,3 @@ def test_a_password_comes_from_a_file_and_is_never_said(
     assert "password authentication failed" in told[0]
     assert "not this" not in "".join([*told, repr(settings)])
     equal(spool, postgres, schema)
-
-
-@pytest.mark.parametrize(
-    ("mode", "says"),
-    [(0o640, "others may read the password in .*: run chmod 600"), (None, "cannot be read: No such file")],
-)
-def test_a_password_file_that_others_may_read_is_refused(
-    spool: Spool, tmp_path: Path, mode: int | None, says: str
-) -> None:
-    file = tmp_path / "password"
-    if mode is not None:
-        file.write_text("secret")
-        file.chmod(mode)
-    with pytest.raises(NotAllowed, match=says):
-        Postgres(spool, PostgresSettings("host=db", "gateway 1", password_file=file), quiet)
-
-
-@pytest.mark.parametrize(
-    ("given_", "says"),
-    [
-        ("host=db password=hunter2", "put it into a file"),
-        ("postgresql://user:hunter2@db/base", "put it into a file"),
-        ("host=db hunter2", "cannot be read"),
-    ],
-)
-def test_a_password_among_the_settings_is_refused_and_not_repeated(spool: Spool, given_: str, says: str) -> None:
-    with pytest.raises(NotAllowed, match=says) as refused:
-        Postgres(spool, PostgresSettings(given_, "gateway 1"), quiet)
-    assert "hunter2" not in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("given_", "mode"),
-    [
-        ("host=db.example.com", "verify-full"),
-        ("postgresql://db.example.com/base", "verify-full"),
-        ("host=localhost,10.0.0.1", "verify-full"),
-        ("host=localhost hostaddr=10.0.0.1", "verify-full"),
-        ("service=plant", "verify-full"),
-        ("host=db.example.com sslmode=require", "require"),
-        ("host=localhost,127.0.0.1,::1", None),
-        ("host=/run/postgresql", None),
-        ("host=@name", None),
-        ("dbname=base", None),
-    ],
-)
-def test_certificates_of_other_computers_are_verified(
-    given_: str, mode: str | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from psycopg.conninfo import conninfo_to_dict
-
-    for name in ("PGHOST", "PGHOSTADDR", "PGSSLMODE", "PGSERVICE"):
-        monkeypatch.delenv(name, raising=False)
-    assert conninfo_to_dict(connection_string(given_, "drivebus", None)).get("sslmode") == mode
-    monkeypatch.setenv("PGHOST", "db.example.com")
-    assert conninfo_to_dict(connection_string("", "drivebus", None))["sslmode"] == "verify-full"
-
-
-def test_without_psycopg_it_says_what_to_install(spool: Spool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "drivebus.sinks.postgres_session")
-    monkeypatch.setitem(sys.modules, "psycopg", None)
-    with pytest.raises(NotAllowed, match=r"PostgreSQL needs psycopg: pip install 'drivebus\[postgres\]'"):
-        Postgres(spool, PostgresSettings("", "gateway 1"), quiet)
-
-
-@given(st.lists(st.tuples(st.integers(1, 60), st.integers(0, 9))))
-def test_intervals_are_what_a_set_of_numbers_is(added: list[tuple[int, int]]) -> None:
-    intervals, numbers = Intervals(), set[int]()
-    written: list[tuple[int, int]] = []
-    for first, length in added:
-        change = intervals.add(first, first + length)
-        numbers |= {*range(first, first + length + 1)}
-        written = sorted({*written} - {*change.gone} | {change.come})
-        assert len(written) == len({*written})
-    assert written == list(intervals)
-    assert {number for first, last in intervals for number in range(first, last + 1)} == numbers
-    missing = {number for first, last in intervals.missing(5, 50) for number in range(first, last + 1)}
-    assert missing == {*range(5, 51)} - numbers
-    # Those that touch have grown together.
-    assert all(before + 1 < first for (_, before), (first, _) in pairwise(written))

@@ -6,6 +6,7 @@ one knows nothing of a commit whose answer was lost, and the other may have lost
 
 from __future__ import annotations
 
+import sqlite3
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -106,6 +107,8 @@ class Delivery:
             try:
                 with closing(self._spool.reader(self._sink)) as reader, closing(self._destination):
                     self._serve(reader)
+            except sqlite3.Error as error:
+                self._fail(f"the spool cannot be read: {error}")
             except Exception as error:  # whatever it is, samples wait, and one more attempt may help
                 self._fail(str(error) or type(error).__name__)
 
@@ -115,9 +118,7 @@ class Delivery:
         self._why = why
         if why not in self._told:
             self._told.add(why)
-            self._tell(
-                f"{self._destination.name} takes no samples: {why}. They wait in the spool, and it is tried again"
-            )
+            self._tell(f"no samples reach {self._destination.name}: {why}. They wait, and it is tried again")
         # A smaller part may be taken where a larger one takes too long.
         self._limit = max(min(self._limit, _BEGINS_WITH) // 2, 1)
         self._closing.wait(self._pause)
@@ -163,8 +164,11 @@ class Delivery:
         self._pause = _FIRST_PAUSE
         if self._told:
             self._told.clear()
-            self._tell(f"{self._destination.name} takes samples again")
-        if took > _SLOW:
-            self._limit = max(self._limit // 2, 1)
+            self._tell(f"samples reach {self._destination.name} again")
+        if self._limit < _BEGINS_WITH:
+            self._limit = min(self._limit * 2, _BEGINS_WITH)
+        elif took > _SLOW:
+            # No smaller: over a long way even a single sample is slow.
+            self._limit = max(self._limit // 2, _BEGINS_WITH)
         elif took < _QUICK and len(samples) >= self._limit:
             self._limit = min(self._limit * 2, _MOST)

@@ -216,9 +216,8 @@ def _in_words() -> Iterator[None]:
         raise NotAllowed("somebody has locked a table for more than 10 s") from None
     except psycopg.Error as error:
         told = [error.diag.message_primary or str(error), error.diag.message_hint or ""]
-        raise NotAllowed(
-            "; ".join(line.strip() for part in told for line in part.splitlines() if line.strip())
-        ) from None
+        lines = (line.strip().rstrip(".") for part in told for line in part.splitlines())
+        raise NotAllowed("; ".join(filter(None, lines))) from None
 
 
 def _groups(samples: Sequence[Spooled]) -> dict[tuple[str, tuple[str, ...]], list[Spooled]]:
