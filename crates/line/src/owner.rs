@@ -44,6 +44,8 @@ pub(crate) struct Owner {
     delays: Delays,
     lumps: Lumps,
     format: SerialFormat,
+    /// After each frame.
+    silence: Duration,
     stats: Arc<Mutex<Stats>>,
     /// Whether nothing was asked since the line was opened.
     is_new: bool,
@@ -77,6 +79,7 @@ impl Owner {
             delays: Delays::default(),
             lumps: Lumps::of_no_line(),
             format,
+            silence: format.t35(),
             stats,
             is_new: true,
             trace: None,
@@ -246,9 +249,8 @@ impl Owner {
         let is_noisy = tally.noise > 0 && !greets;
         let is_strange = !talk.strange.is_empty();
         let is_other = exchange.bytes > 0 || is_strange;
-        let occupied = exchange.sent.map_or(Duration::ZERO, |sent| {
-            exchange.ended.saturating_duration_since(sent).saturating_add(self.format.t35())
-        });
+        let took = exchange.sent.map(|sent| exchange.ended.saturating_duration_since(sent));
+        let occupied = took.map_or(Duration::ZERO, |took| took.saturating_add(self.silence));
         self.stats().count(unit, |counters| {
             counters.requests += u64::from(exchange.sent.is_some());
             counters.occupied = counters.occupied.saturating_add(occupied);
@@ -256,10 +258,8 @@ impl Owner {
             if has_seen_more {
                 counters.add(tally);
             }
-            match (failure, exchange.sent) {
-                (None, Some(sent)) => {
-                    counters.answered(exchange.ended.saturating_duration_since(sent), delay.unwrap_or_default());
-                }
+            match (failure, took) {
+                (None, Some(took)) => counters.answered(took, delay.unwrap_or_default()),
                 (Some(Failure::NoAnswer { .. }), _) => {
                     counters.timeouts += 1;
                     counters.other_answers += u64::from(is_other);
