@@ -115,7 +115,10 @@ def test_drives_are_chosen_by_name_and_by_group_each_once(tmp_path: Path) -> Non
         ('[groups]\npumps = ["pump1"]', ['2: there is no drive "pump1"']),
         (
             "[drive.pump1]",
-            ['1: "drive" is not known here; did you mean "drives"?; allowed is "lines", "drives", "groups", "share"'],
+            [
+                '1: "drive" is not known here; did you mean "drives"?; allowed is "lines", "drives", "groups", '
+                '"share", "poll", "spool", "prometheus", "postgres"'
+            ],
         ),
         ("lines = 3", ["1: lines is a table of tables, such as [lines.NAME]"]),
         ("[lines]\nhall = 3", ["2: lines.hall is a table: [lines.hall]"]),

@@ -36,7 +36,9 @@ def connection_string(given: str, application: str, password_file: Path | None) 
         told = {name: str(value) for name, value in conninfo_to_dict(given).items() if value is not None}
     except ProgrammingError:
         # What libpq says of it repeats a part, which may be a password.
-        raise BadArgument('the connection string cannot be read: it is either "host=… dbname=…" or a URI') from None
+        raise BadArgument(
+            "the connection string cannot be read: it is neither settings and their values nor a URI"
+        ) from None
     if any(secret in told for secret in _SECRETS):
         raise BadArgument("a password does not belong into a connection string: put it into a file of its own")
     if password_file is not None:
