@@ -18,7 +18,7 @@ from drivebus.sinks.picture import DrivePicture
 from drivebus.site import SiteDrive, SiteLine, SitePoll
 from drivebus.spool import Layout, Spool
 
-__all__ = ["Polling", "digits_of"]
+__all__ = ["Polling", "digits_of", "handle_of"]
 
 
 class Polling:
@@ -49,7 +49,7 @@ class Polling:
         """
         self._begun = []
         for place, poll, chosen in self._polls:
-            drives = {_handle(bus, each): each.name for each in chosen}
+            drives = {handle_of(bus, each): each.name for each in chosen}
             names = {drive: list(poll.registers) or drive.readable() for drive in drives}
             series = {drive: _Series(name, drive, names[drive], poll) for drive, name in drives.items()}
             begun = bus.poll(names, poll.interval, callback=partial(self._take, place, series))
@@ -104,5 +104,6 @@ def digits_of(scale: float) -> int:
     return max(0, -int(Decimal(repr(scale)).normalize().as_tuple().exponent))
 
 
-def _handle(bus: Bus, drive: SiteDrive) -> Drive:
+def handle_of(bus: Bus, drive: SiteDrive) -> Drive:
+    """*drive* on *bus*, as the file says it."""
     return bus.drive(drive.unit, drive.profile, unverified=drive.unverified, variants=drive.variants or None)

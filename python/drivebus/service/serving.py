@@ -17,7 +17,7 @@ from drivebus.gateway import Allow, Gateway, GatewayStats
 from drivebus.latch import Latch
 from drivebus.service.mistakes import check, settings_of
 from drivebus.service.notify import notify, watchdog_interval
-from drivebus.service.polling import Polling
+from drivebus.service.polling import Polling, handle_of
 from drivebus.service.status import StatusFile
 from drivebus.sinks import GatewayPicture, LinePicture, Picture, Postgres, Prometheus
 from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SiteLine
@@ -322,9 +322,7 @@ def _allowed(bus: Bus, rule: SiteAllow, drives: dict[str, Drive]) -> Allow:
         if not writes:
             return each.unit
         if each.name not in drives:
-            drives[each.name] = bus.drive(
-                each.unit, each.profile, unverified=each.unverified, variants=each.variants or None
-            )
+            drives[each.name] = handle_of(bus, each)
         return drives[each.name]
 
     return Allow(

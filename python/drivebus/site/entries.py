@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
+from drivebus import checks
 from drivebus.line.addresses import Addresses
 
-__all__ = ["SiteDrive", "SiteLine"]
+if TYPE_CHECKING:
+    from drivebus.site.reading import Key, Reading
+
+__all__ = ["SiteDrive", "SiteLine", "drives_named"]
 
 
 @dataclass(frozen=True)
@@ -57,3 +62,21 @@ class SiteDrive:
     variants: Mapping[str, str] = field(default_factory=dict)
     unverified: bool = False
     read_only: bool = False
+
+
+def drives_named(
+    names: Iterable[str],
+    drives: Mapping[str, SiteDrive],
+    groups: Mapping[str, tuple[SiteDrive, ...]],
+    file: Reading,
+    where: Key,
+) -> tuple[SiteDrive, ...]:
+    """The drives that *names* of drives and groups mean, each once; of what is neither, *file* complains at *where*."""
+    chosen: dict[str, SiteDrive] = {}
+    for name in names:
+        members = groups.get(name, (drives[name],) if name in drives else ())
+        if not members and name not in groups:
+            hint = checks.closest(name, [*drives, *groups])
+            file.complain(where, f'there is no drive or group "{name}"{hint}')
+        chosen |= {drive.name: drive for drive in members if drive.name not in chosen}
+    return tuple(chosen.values())

@@ -23,8 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from drivebus import checks
-from drivebus.site.entries import SiteDrive
+from drivebus.site.entries import SiteDrive, drives_named
 from drivebus.site.reading import Key, Reading, Wrong, listed, number, text, whole
 
 __all__ = ["SitePoll", "SiteSpool", "polls_of", "spool_of"]
@@ -79,13 +78,9 @@ def polls_of(
 
 def spool_of(file: Reading) -> SiteSpool | None:
     """Where *file* says that samples wait; None: nowhere, so that no disk wears for nothing."""
-    table = file.data.get("spool")
+    table = file.section("spool", ("path", "size_mb"))
     if table is None:
         return None
-    if not isinstance(table, dict):
-        file.complain(("spool",), "spool is a table: [spool]")
-        return None
-    file.check_keys(table, ("path", "size_mb"), ("spool",))
     path = file.value(("spool",), table, "path", text) or "drivebus-spool"
     megabytes = file.value(("spool",), table, "size_mb", whole(*_MEGABYTES)) or 1_000
     return SiteSpool(file.path.parent / path, megabytes * 1_000_000)
@@ -105,15 +100,9 @@ def _poll(
     interval = file.value(where, table, "interval", number(*INTERVAL)) or 1.0
     heartbeat = file.value(where, table, "heartbeat", number(*HEARTBEAT)) or 60.0
     band = file.value(where, table, "band", _band) or {}
-    chosen: dict[str, SiteDrive] = {}
-    for name in drives if names is None else names:
-        members = groups.get(name, (drives[name],) if name in drives else ())
-        if not members and name not in groups:
-            hint = checks.closest(name, [*drives, *groups])
-            file.complain((*where, "drives"), f'there is no drive or group "{name}"{hint}')
-        chosen |= {drive.name: drive for drive in members if drive.name not in chosen}
+    chosen = drives_named(drives if names is None else names, drives, groups, file, (*where, "drives"))
     at = {key: file.line_of((*where, key)) for key in keys if key in table} | {"": file.line_of(where)}
-    return SitePoll(tuple(chosen.values()), tuple(registers), interval, band, heartbeat, at)
+    return SitePoll(chosen, tuple(registers), interval, band, heartbeat, at)
 
 
 def _band(value: Any) -> dict[str, float]:

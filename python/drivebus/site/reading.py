@@ -96,6 +96,17 @@ class Reading:
                 hint = checks.closest(key, allowed)
                 self.complain((*where, key), f'"{key}" is not known here{hint}; allowed is {quoted(allowed)}')
 
+    def section(self, name: str, allowed: tuple[str, ...]) -> dict[str, Any] | None:
+        """The table *name* of the file, which may have the keys *allowed*; None where there is no such table."""
+        table = self.data.get(name)
+        if table is None:
+            return None
+        if not isinstance(table, dict):
+            self.complain((name,), f"{name} is a table: [{name}]")
+            return None
+        self.check_keys(table, allowed, (name,))
+        return table
+
     def tables(self, table: Mapping[str, Any], where: Key) -> list[tuple[Key, dict[str, Any]]]:
         """The tables of the list at *where*, which is in *table*, each with where it stands itself."""
         name = str(where[-1])

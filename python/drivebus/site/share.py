@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from drivebus import checks
-from drivebus.site.entries import SiteDrive, SiteLine
+from drivebus.site.entries import SiteDrive, SiteLine, drives_named
 from drivebus.site.reading import Key, Reading, Wrong, address, flag, listed, number, one_of, quoted, text, whole
 
 __all__ = ["SiteAllow", "SiteGateway", "SiteShare", "share_of"]
@@ -107,11 +107,9 @@ def share_of(
     groups: Mapping[str, tuple[SiteDrive, ...]],
 ) -> SiteShare:
     """What *file* says of sharing; what is wrong in it is complained of."""
-    table = file.data.get("share", {})
-    if not isinstance(table, dict):
-        file.complain(("share",), "share is a table: [share]")
+    table = file.section("share", ("group", "audit", "realtime", "tcp", "pty"))
+    if table is None:
         return SiteShare()
-    file.check_keys(table, ("group", "audit", "realtime", "tcp", "pty"), ("share",))
     group = file.value(("share",), table, "group", text)
     audit = file.value(("share",), table, "audit", text)
     realtime = file.value(("share",), table, "realtime", flag) or False
@@ -173,21 +171,15 @@ class _Gateways:
         functions = file.value(where, table, "functions", listed(_function, "[3, 6]"))
         write = file.value(where, table, "write", listed(_register, '["P00.11"]'))
         commands = file.value(where, table, "commands", listed(text, '["run", "setpoint"]'))
-        drives: dict[str, SiteDrive] = {}
-        for name in names:
-            members = self.groups.get(name, (self.drives[name],) if name in self.drives else ())
-            if not members and name not in self.groups:
-                hint = checks.closest(name, [*self.drives, *self.groups])
-                file.complain((*where, "drives"), f'there is no drive or group "{name}"{hint}')
-            for drive in members:
-                if line is not None and drive.line != line:
-                    file.complain((*where, "drives"), f'"{drive.name}" is on the line "{drive.line.name}"')
-                drives.setdefault(drive.name, drive)
+        drives = drives_named(names, self.drives, self.groups, file, (*where, "drives"))
+        for drive in drives:
+            if line is not None and drive.line != line:
+                file.complain((*where, "drives"), f'"{drive.name}" is on the line "{drive.line.name}"')
         at = {key: file.line_of((*where, key)) for key in keys if key in table} | {"": file.line_of(where)}
         some = None if functions is None else tuple(functions)
         return SiteAllow(
             tuple(networks or ()),
-            tuple(drives.values()),
+            drives,
             tuple(units or ()),
             some,
             tuple(write or ()),

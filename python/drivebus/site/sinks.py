@@ -36,14 +36,10 @@ class SitePrometheus:
 
 def prometheus_of(file: Reading) -> SitePrometheus | None:
     """What *file* says of Prometheus; what is wrong in it is complained of."""
-    table = file.data.get("prometheus")
+    where = ("prometheus",)
+    table = file.section("prometheus", ("address",))
     if table is None:
         return None
-    where = ("prometheus",)
-    if not isinstance(table, dict):
-        file.complain(where, "prometheus is a table: [prometheus]")
-        return None
-    file.check_keys(table, ("address",), where)
     given = file.value(where, table, "address", address, needed=True)
     return None if given is None else SitePrometheus(given, file.line_of(where))
 
@@ -69,14 +65,10 @@ class SitePostgres:
 
 def postgres_of(file: Reading) -> SitePostgres | None:
     """What *file* says of PostgreSQL; what is wrong in it is complained of."""
-    table = file.data.get("postgres")
+    where = ("postgres",)
+    table = file.section("postgres", ("conninfo", "gateway", "schema", "password_file"))
     if table is None:
         return None
-    where = ("postgres",)
-    if not isinstance(table, dict):
-        file.complain(where, "postgres is a table: [postgres]")
-        return None
-    file.check_keys(table, ("conninfo", "gateway", "schema", "password_file"), where)
     conninfo = file.value(where, table, "conninfo", text, needed=True)
     gateway = file.value(where, table, "gateway", text, needed=True)
     schema = file.value(where, table, "schema", text) or "drivebus"
