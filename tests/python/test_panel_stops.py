@@ -176,7 +176,7 @@ def test_space_stops_all_that_the_panel_started_and_s_only_one(simulator: Simula
         assert (told(simulator, 1), told(simulator, 2)) == ([FORWARD], [FORWARD, STOP])
         start(terminal)
         # One that is under way yet would be taken back, and not sent.
-        terminal.until("2 running", "2 started by this panel")
+        wait_until(lambda: told(simulator, 2).count(FORWARD) == 2)
         terminal.press("\x1b[A", " ")
         wait_until(lambda: told(simulator, 1)[-1] == told(simulator, 2)[-1] == STOP)
         terminal.without("started by this panel")

@@ -276,6 +276,10 @@ profile = "gd350"
 """
 
 
+SPARSE = ("running_frequency", "status_word_1", "fault_code")
+"""What the second poll asks: what it names, and what tells state and fault."""
+
+
 @NO_PTY
 def test_what_drives_say_waits_in_the_spool(tmp_path: Path) -> None:
     """Also while a client runs the motor; what is not new stays out, and a drive that is away is told."""
@@ -301,14 +305,18 @@ def test_what_drives_say_waits_in_the_spool(tmp_path: Path) -> None:
             assert re.search(r"ghost, asked \d+\.\d s ago: unit 9, read", shown)
         with Spool(tmp_path / "drivebus-spool", 1 << 30, print) as spool:
             samples = spool.reader("test").after(0, 10_000)
-        monitor = [each for each in samples if len(each.layout.names) > 1]
-        frequency = [each.values[0] for each in samples if each.layout.names == ("running_frequency",) and each.values]
+        monitor = [each for each in samples if len(each.layout.names) > len(SPARSE)]
+        frequency = [each.values[0] for each in samples if each.layout.names == SPARSE and each.values]
         speed = monitor[0].layout.names.index("running_frequency")
         assert [each.values[speed] for each in monitor] == sorted(each.values[speed] for each in monitor)
         assert len({each.values[speed] for each in monitor}) > 20
         assert 1 <= len(frequency) <= 4
-        gone = [each for each in samples if each.layout.drive == "ghost"]
+        gone = [each for each in samples if each.layout.drive == "ghost" and not each.layout.event]
         assert gone
+        told = [(each.layout.drive, each.layout.event, each.missing) for each in samples if each.layout.event]
+        told = [each for each in told if each[1] != "told"][:3]
+        assert [each[:2] for each in told] == [("hall", "open"), ("ghost", "gone"), ("pump1", "state")]
+        assert told[2][2] == "stopped, now forward"
         assert all(each.missing.startswith("unit 9, read") and not each.values for each in gone)
 
 

@@ -96,7 +96,7 @@ def test_what_drives_say_is_in_the_database_once(tmp_path: Path, postgres: Serve
 
 def is_all_in(service: Service) -> bool:
     """Whether the database has what was spooled a moment ago."""
-    status = service.status()["postgres"]
+    status = service.status()["outlets"]["postgres"]
     return bool(status["connected"] and status["delivered"] and not status["behind"])
 
 

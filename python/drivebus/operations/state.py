@@ -26,6 +26,7 @@ __all__ = [
     "look",
     "ping",
     "planned",
+    "read_off",
     "remember",
     "seen_last",
     "state",
@@ -75,13 +76,10 @@ async def glance(unit: DriveView, *, urgent: bool = False) -> Look:
     fields: dict[str, str] = {}
     for word in plan.words:
         fields.update(unit.profile.fields(word, values[word]))
-    number = unit.profile.fault_number(values[plan.fault]) if plan.fault is not None else 0
     told = None if plan.state is None else values[plan.state]
-    in_fault = told is not None and (
-        unit.profile.is_in_fault(told) or (number != 0 and not unit.profile.state_tells_fault())
-    )
+    doing, number, in_fault = read_off(unit, told, None if plan.fault is None else values[plan.fault])
     seen = Look(
-        State.UNKNOWN if told is None else state_of(unit, told),
+        doing,
         fields,
         unit.profile.fault(number) if number else None,
         first,
@@ -227,6 +225,19 @@ async def fault_history(unit: DriveView, *, unverified: bool = False) -> list[Fa
     if faults and kept:
         faults[0] = replace(faults[0], values=await registers.snapshot(unit, *kept))
     return faults
+
+
+def read_off(unit: DriveView, state: int | None, fault: int | None) -> tuple[State, int, bool]:
+    """What the words for *state* and *fault* say: the state, the number of the fault, and whether the drive is in it.
+
+    None is a word that is not known.
+    """
+    profile = unit.profile
+    number = 0 if fault is None else profile.fault_number(fault)
+    if state is None:
+        return State.UNKNOWN, number, False
+    in_fault = profile.is_in_fault(state) or (number != 0 and not profile.state_tells_fault())
+    return state_of(unit, state), number, in_fault
 
 
 def state_word(unit: DriveView, what: str) -> str:

@@ -12,13 +12,17 @@ from typing import Any
 from drivebus.bus import Bus
 from drivebus.drive import Drive
 from drivebus.line.poll_samples import Sample
+from drivebus.operations import state
+from drivebus.operations.drive_base import unit_of
 from drivebus.poll import Poll
 from drivebus.service.changes import Changes
+from drivebus.service.events import Events
+from drivebus.service.handles import handle_of
 from drivebus.sinks.picture import DrivePicture
-from drivebus.site import SiteDrive, SiteLine, SitePoll
+from drivebus.site import SiteLine, SitePoll
 from drivebus.spool import Layout, Spool
 
-__all__ = ["Polling", "digits_of", "handle_of"]
+__all__ = ["Polling", "digits_of"]
 
 
 class Polling:
@@ -28,15 +32,17 @@ class Polling:
         line: The line.
         polls: What is asked, on this line and on others.
         spool: Where it goes.
+        events: Hears of what each drive says.
     """
 
-    def __init__(self, line: SiteLine, polls: tuple[SitePoll, ...], spool: Spool | None) -> None:
+    def __init__(self, line: SiteLine, polls: tuple[SitePoll, ...], spool: Spool | None, events: Events) -> None:
         self._polls = [
             (place, poll, chosen)
             for place, poll in enumerate(polls, 1)
             if (chosen := [drive for drive in poll.drives if drive.line == line])
         ]
         self._spool = spool
+        self._events = events
         self._begun: list[Poll[Drive]] = []
         self._lock = threading.Lock()
         self._last: dict[tuple[int, str], DrivePicture] = {}
@@ -50,8 +56,8 @@ class Polling:
         self._begun = []
         for place, poll, chosen in self._polls:
             drives = {handle_of(bus, each): each.name for each in chosen}
-            names = {drive: list(poll.registers) or drive.readable() for drive in drives}
-            series = {drive: _Series(name, drive, names[drive], poll) for drive, name in drives.items()}
+            series = {drive: _Series(name, drive, poll) for drive, name in drives.items()}
+            names = {drive: of.layout.names for drive, of in series.items()}
             begun = bus.poll(names, poll.interval, callback=partial(self._take, place, series))
             self._begun.append(stack.enter_context(begun))
 
@@ -76,8 +82,11 @@ class Polling:
         # A unit that is silent goes on being silent, whether it was asked or spared.
         kind = "" if sample.missing is None else type(sample.missing).__name__
         values = [] if missing else [sample[name] for name in of.layout.names]
+        doing, fault = ("", "") if missing else of.read_off(sample)
+        said = DrivePicture(place, of.layout, sample.time, missing, tuple(values), doing, fault)
         with self._lock:
-            self._last[place, of.layout.drive] = DrivePicture(place, of.layout, sample.time, missing, tuple(values))
+            self._last[place, of.layout.drive] = said
+        self._events.saw(said)
         if self._spool is not None and of.changes.keeps(sample.time, kind, values):
             self._spool.add(of.layout, sample.time, sample.answered - sample.time, missing, values)
 
@@ -85,7 +94,11 @@ class Polling:
 class _Series:
     """The samples of one drive in one poll."""
 
-    def __init__(self, name: str, drive: Drive, registers: list[str], poll: SitePoll) -> None:
+    def __init__(self, name: str, drive: Drive, poll: SitePoll) -> None:
+        self._unit = unit_of(drive)
+        self._told = state.planned(self._unit)
+        asked = [*(poll.registers or drive.readable()), self._told.state, self._told.fault]
+        registers = list(dict.fromkeys(each for each in asked if each is not None))
         rows = [drive.describe(register) for register in registers]
         self.layout = Layout(
             name,
@@ -98,12 +111,17 @@ class _Series:
         heartbeat = poll.heartbeat - poll.interval / 2
         self.changes = Changes([poll.band.get(register, 0.0) for register in registers], heartbeat)
 
+    def read_off(self, sample: Sample[Drive]) -> tuple[str, str]:
+        """What the drive is doing, and the fault that it is in, in words; empty what it does not tell."""
+        profile = self._unit.profile
+        word, fault = (None if name is None else int(sample[name]) for name in (self._told.state, self._told.fault))
+        doing, number, in_fault = state.read_off(self._unit, word, fault)
+        told = "" if word is None else str(doing)
+        if number and (in_fault or word is None):
+            return told, str(profile.fault(number))
+        return told, "a fault that it does not name" if in_fault else ""
+
 
 def digits_of(scale: float) -> int:
     """How many digits behind the point a value has that counts in steps of *scale*."""
     return max(0, -int(Decimal(repr(scale)).normalize().as_tuple().exponent))
-
-
-def handle_of(bus: Bus, drive: SiteDrive) -> Drive:
-    """*drive* on *bus*, as the file says it."""
-    return bus.drive(drive.unit, drive.profile, unverified=drive.unverified, variants=drive.variants or None)

@@ -15,11 +15,15 @@ from drivebus.drive import Drive
 from drivebus.errors import DrivebusError, NotAllowed
 from drivebus.gateway import Allow, Gateway, GatewayStats
 from drivebus.latch import Latch
-from drivebus.service.mistakes import check, settings_of
+from drivebus.service.events import Events
+from drivebus.service.handles import handle_of
+from drivebus.service.mistakes import check
 from drivebus.service.notify import notify, watchdog_interval
-from drivebus.service.polling import Polling, handle_of
+from drivebus.service.orders import Orders
+from drivebus.service.outlets import Plant, outlets_of
+from drivebus.service.polling import Polling
 from drivebus.service.status import StatusFile
-from drivebus.sinks import GatewayPicture, LinePicture, Picture, Postgres, Prometheus
+from drivebus.sinks import GatewayPicture, LinePicture, Picture
 from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SiteLine
 from drivebus.spool import Spool
 
@@ -51,18 +55,17 @@ class Service:
         self._site = site
         self._tell = tell
         self._over = Latch()
-        self._metrics: Prometheus | None = None
-        self._why = ""
         of_line = {
             name: [each for each in site.share.gateways if each.line == line] for name, line in site.lines.items()
         }
         self._spool = _spool_of(site, tell)
-        self._postgres = None
-        if site.postgres is not None and self._spool is not None:
-            self._postgres = Postgres(self._spool, settings_of(site.postgres), tell)
+        self._events = Events(tell, self._spool)
+        self._orders = Orders(site.drives, self._events)
         self._lines = [
-            _Served(site, line, of_line[name], tell, self._over, self._spool) for name, line in site.lines.items()
+            _Served(site, line, of_line[name], tell, self._over, self._spool, self._events, self._orders)
+            for name, line in site.lines.items()
         ]
+        self._outlets = outlets_of(Plant(site, self.picture, self._spool, self._events, self._orders, tell))
 
     def run(self, duration: float | None = None) -> None:
         """Serves until `end` is called, or for *duration* seconds. What clients set in motion is halted then."""
@@ -73,19 +76,17 @@ class Service:
                 thread.start()
             for line in self._lines:
                 line.tried.wait()
-            if self._postgres is not None:
-                self._postgres.start()
+            for outlet in self._outlets.values():
+                outlet.start()
             notify("READY=1")
             self._watch(status, None if duration is None else time.monotonic() + duration)
         finally:
             notify("STOPPING=1")
             self._over.set()
-            if self._metrics is not None:
-                self._metrics.close()
             for thread in threads:
                 thread.join()
-            if self._postgres is not None:
-                self._postgres.close()
+            for outlet in self._outlets.values():
+                outlet.close()
             if self._spool is not None:
                 self._spool.close()
             with suppress(OSError):
@@ -104,7 +105,8 @@ class Service:
         """Says how the service does, and that it lives: as long as each line has given somebody the turn meanwhile."""
         interval, turns, pinged = watchdog_interval(), {line.name: -1 for line in self._lines}, 0.0
         while not self._over.is_set() and (until is None or time.monotonic() < until):
-            self._tell_prometheus()
+            for outlet in self._outlets.values():
+                outlet.turn()
             # A disk that is full ends nobody's service.
             with suppress(OSError):
                 status.write(self.status())
@@ -116,20 +118,6 @@ class Service:
             left = _AGAIN if until is None else min(_AGAIN, max(until - time.monotonic(), 0.0))
             self._over.wait(left if interval is None else min(left, interval / 2))
 
-    def _tell_prometheus(self) -> None:
-        """Listens for Prometheus, as soon as that can be."""
-        if self._site.prometheus is None or self._metrics is not None:
-            return
-        address = self._site.prometheus.address
-        try:
-            self._metrics = Prometheus(address, self.picture)
-        except DrivebusError as error:
-            if str(error) != self._why:
-                self._tell(f"prometheus: {error}; tried again each second")
-            self._why = str(error)
-        else:
-            self._tell(f"prometheus: metrics are at http://{address}/metrics")
-
     def status(self) -> dict[str, Any]:
         """How it does: the time, its process, and of each line what `drivebus serve --status` shows."""
         moment = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
@@ -138,7 +126,7 @@ class Service:
             "process": os.getpid(),
             "file": str(self._site.path),
             "lines": {line.name: line.status() for line in self._lines},
-            "postgres": None if self._postgres is None else self._postgres.status(),
+            "outlets": {name: outlet.status() for name, outlet in self._outlets.items()},
             "spool": None if self._spool is None else {"last": self._spool.last, "lost": self._spool.lost},
         }
 
@@ -154,6 +142,8 @@ class _Served:
         tell: Callable[[str], None],
         over: Latch,
         spool: Spool | None,
+        events: Events,
+        orders: Orders,
     ) -> None:
         self.name = line.name
         self.turns = 0
@@ -161,8 +151,10 @@ class _Served:
         self.tried = Latch()
         """Closed when it was tried to open it."""
         self._site, self._line, self._told = site, line, gateways
-        self._polling = Polling(line, site.polls, spool)
+        self._polling = Polling(line, site.polls, spool, events)
         self._tell = tell
+        self._events = events
+        self._orders = orders
         self._over = over
         self._open: tuple[Bus, list[Gateway]] | None = None
         self._before = (time.monotonic(), 0.0)
@@ -190,7 +182,7 @@ class _Served:
         except (DrivebusError, OSError) as error:
             if str(error) != self._why:
                 self._why = str(error)
-                self._tell(f"{self.name}: {error}; tried again each second")
+                self._events.note(self.name, "away", f"{error}; tried again each second")
             self.turns += 1
             self.tried.set()
             self._over.wait(_AGAIN)
@@ -211,9 +203,10 @@ class _Served:
         bus = stack.enter_context(Bus(line.port, **options))
         gateways.extend(stack.enter_context(self._gateway(bus, each)) for each in self._told)
         self._polling.begin(bus, stack)
+        self._orders.begin(bus, self.name, stack)
         self._open, self._why = (bus, gateways), ""
         at = ", ".join(gateway.address for gateway in gateways)
-        self._tell(f"{self.name}: {bus.port} is served{f' at {at}' if at else ''}")
+        self._events.note(self.name, "open", f"{bus.port} is served{f' at {at}' if at else ''}")
 
     def _gateway(self, bus: Bus, told: SiteGateway) -> Gateway:
         drives: dict[str, Drive] = {}
@@ -243,7 +236,7 @@ class _Served:
             notes = [*stats.notes, *stats.wills]
             for text in notes:
                 if text not in known:
-                    self._tell(f"{self.name}: {text}")
+                    self._events.note(self.name, "told", text)
             known = notes
             self._polling.check()
             # Nothing is sent: whoever uses the line lets this one have its turn, or hangs.

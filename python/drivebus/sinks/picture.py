@@ -21,6 +21,8 @@ class DrivePicture:
         time: Unix time in seconds at which it was asked.
         missing: Why there are no values, in words; empty where there are.
         values: One for each name of the layout.
+        state: What it is doing, in words; empty where its family has no word for that, or it did not answer.
+        fault: The fault that it is in, in words; empty where it is in none, or that cannot be told.
     """
 
     poll: int
@@ -28,6 +30,8 @@ class DrivePicture:
     time: float
     missing: str
     values: tuple[Value, ...]
+    state: str = ""
+    fault: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""What the samples of one drive have, and how their values are packed: the same for each, so it is written once."""
+"""What the samples of one drive have, and how their values are packed: the same for each, so it is written once.
+
+An event has no values: its layout says of what and of which kind it is.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +30,7 @@ class Layout:
         names: Of its values.
         units: Of each; empty where it has none.
         digits: Of each behind the point, as its drive counts.
+        event: Which kind of event it is, which has its words where a sample says why it has no values; empty: a sample.
     """
 
     drive: str
@@ -34,10 +38,17 @@ class Layout:
     names: tuple[str, ...]
     units: tuple[str, ...]
     digits: tuple[int, ...]
+    event: str = ""
+
+    @classmethod
+    def of_events(cls, subject: str, kind: str) -> Layout:
+        """That of the events of one *kind* at *subject*: a drive, a line or something else that has a name."""
+        return cls(subject, "", (), (), (), kind)
 
     def text(self) -> str:
         """All of it, for `of_text`."""
-        return json.dumps([self.drive, self.family, self.names, self.units, self.digits], ensure_ascii=False)
+        told = [self.drive, self.family, self.names, self.units, self.digits, self.event]
+        return json.dumps(told, ensure_ascii=False)
 
     @classmethod
     def of_text(cls, text: str) -> Layout:
@@ -46,8 +57,8 @@ class Layout:
         Raises:
             ValueError: It is something else.
         """
-        drive, family, names, units, digits = json.loads(text)
-        return cls(drive, family, tuple(names), tuple(units), tuple(digits))
+        drive, family, names, units, digits, event = json.loads(text)
+        return cls(drive, family, tuple(names), tuple(units), tuple(digits), event)
 
     def packed(self, values: Sequence[Value]) -> bytes:
         """*values*, one for each name: none of them is changed by it."""

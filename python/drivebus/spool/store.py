@@ -40,14 +40,14 @@ _AT_A_TIME = 20
 """Of so many parts of a full file, the oldest goes."""
 _PATIENCE = 10.0
 """Seconds that a commit waits for another program that looks into the file."""
-_NOTHING = Layout("", "", (), (), ())
-"""What a damaged sample has."""
+_DAMAGED = Layout.of_events("", "damaged")
+"""What a damaged sample is."""
 _NO_NUMBER = 1 << 62
 """No sample has such a number."""
 
 
 class Spooled(NamedTuple):
-    """One sample, as it is read from the file.
+    """One sample, or one event, as it is read from the file.
 
     Attributes:
         seq: Its number. Within the file it only rises.
@@ -55,7 +55,7 @@ class Spooled(NamedTuple):
         layout: What it has.
         time: Unix time in seconds at which its first request left.
         took: Seconds until its last answer was complete, or was given up.
-        missing: Why there are no values, in words; empty where there are.
+        missing: Why there are no values, in words; empty where there are. Of an event: what happened.
         values: One for each name of the layout.
     """
 
@@ -139,6 +139,10 @@ class Spool:
             self._new.append(new)
             self._added += 1
             self._give_way()
+
+    def note(self, subject: str, kind: str, at: float, text: str) -> None:
+        """Keeps an event, in its place among the samples: what happened to *subject*, in words. Any thread."""
+        self.add(Layout.of_events(subject, kind), at, 0.0, text, ())
 
     def reached(self, sink: str, seq: int) -> None:
         """Whoever is called *sink* has all up to *seq*; that is kept with the next commit. Any thread."""
@@ -348,7 +352,7 @@ class Reader:
 
     def _damaged(self, seq: int, epoch: int) -> Spooled:
         """A sample that is not as it was written. Its number is kept, so that nobody waits for it."""
-        return Spooled(seq, self._epoch(epoch), _NOTHING, 0.0, 0.0, "damaged in the spool", ())
+        return Spooled(seq, self._epoch(epoch), _DAMAGED, 0.0, 0.0, "damaged in the spool", ())
 
     def _epoch(self, number: int) -> str:
         if number not in self._epochs:

@@ -90,11 +90,20 @@ def _show(session: Session, status: dict[str, Any]) -> None:
             )
         for hint in line["hints"]:
             session.out.say(f"{name}: {hint}")
-    if (postgres := status["postgres"]) is not None:
-        how = "connected" if postgres["connected"] else f"not connected: {postgres['why']}"
-        session.out.say(f"PostgreSQL: {how}; {postgres['delivered']} samples delivered, {postgres['behind']} behind")
+    for name, outlet in status["outlets"].items():
+        session.out.say(f"{name}: {_outlet_in_words(outlet)}")
     if status["spool"] is not None:
         session.out.say(f"spool: {status['spool']['last']} samples, {status['spool']['lost']} lost")
+
+
+def _outlet_in_words(outlet: dict[str, Any]) -> str:
+    """How something does that is told how the plant is."""
+    is_well = outlet.get("connected", outlet.get("open", False))
+    how = "connected" if "connected" in outlet else "open"
+    told = how if is_well else f"not {how}: {outlet['why']}"
+    if "delivered" in outlet:
+        told += f"; {outlet['delivered']} samples delivered, {outlet['behind']} behind"
+    return told
 
 
 COMMANDS = [serve]

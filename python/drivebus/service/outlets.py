@@ -1,0 +1,140 @@
+"""What a service tells others: each outlet that its file asks for, begun and ended with it.
+
+None of them can hold a line up, and what goes wrong in one is told, and tried again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from drivebus.errors import DrivebusError
+from drivebus.service.events import Events
+from drivebus.service.mistakes import settings_of
+from drivebus.service.orders import Orders
+from drivebus.sinks import Picture, Postgres, Prometheus
+from drivebus.site import Site
+from drivebus.spool import Spool
+
+__all__ = ["Outlet", "Plant", "outlets_of"]
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A plant, as outlets see it.
+
+    Attributes:
+        site: What its file says.
+        look: Gives how it is now. Any thread.
+        spool: Where samples and events wait, if they do.
+        events: What happened.
+        orders: What drives can be told.
+        tell: Hears in words what people should know.
+    """
+
+    site: Site
+    look: Callable[[], Picture]
+    spool: Spool | None
+    events: Events
+    orders: Orders
+    tell: Callable[[str], None]
+
+
+class Outlet(Protocol):
+    """Something that is told how the plant is."""
+
+    def start(self) -> None:
+        """Begins; returns at once."""
+
+    def turn(self) -> None:
+        """Comes once a second."""
+
+    def close(self) -> None:
+        """Ends within a second."""
+
+    def status(self) -> dict[str, Any]:
+        """How it does, in plain words and numbers."""
+
+
+def outlets_of(plant: Plant) -> dict[str, Outlet]:
+    """Those that the file of *plant* asks for, by their sections."""
+    site, found = plant.site, dict[str, Outlet]()
+    if site.postgres is not None and plant.spool is not None:
+        found["postgres"] = _Delivering(Postgres(plant.spool, settings_of(site.postgres), plant.tell))
+    if site.prometheus is not None:
+        address = site.prometheus.address
+        found["prometheus"] = Listening(
+            "prometheus",
+            f"metrics are at http://{address}/metrics",
+            lambda: Prometheus(address, plant.look),
+            plant.tell,
+        )
+    return found
+
+
+class _Delivers(Protocol):
+    def start(self) -> None: ...
+    def close(self) -> None: ...
+    def status(self) -> dict[str, Any]: ...
+
+
+class _Delivering:
+    """A sink with a thread of its own."""
+
+    def __init__(self, sink: _Delivers) -> None:
+        self.start, self.close, self.status = sink.start, sink.close, sink.status
+
+    def turn(self) -> None:
+        """Its own thread does all."""
+
+
+class _Closes(Protocol):
+    def close(self) -> None: ...
+
+
+class Listening:
+    """Something that listens at an address, as soon as that can be.
+
+    Args:
+        name: What people call it.
+        where: What is told when it listens.
+        listen: Listens, until what it returns is closed.
+        tell: Hears in words what people should know.
+    """
+
+    def __init__(self, name: str, where: str, listen: Callable[[], _Closes], tell: Callable[[str], None]) -> None:
+        self._name = name
+        self._where = where
+        self._listen = listen
+        self._tell = tell
+        self._open: _Closes | None = None
+        self._why = ""
+
+    def start(self) -> None:
+        """Listens, or says why not."""
+        self.turn()
+
+    def turn(self) -> None:
+        """Tries again, where it does not listen."""
+        if self._open is not None:
+            return
+        try:
+            self._open = self._listen()
+        except DrivebusError as error:
+            if str(error) != self._why:
+                self._tell(f"{self._name}: {error}; tried again each second")
+            self._why = str(error)
+        else:
+            self._why = ""
+            self._tell(f"{self._name}: {self._where}")
+
+    def close(self) -> None:
+        """Listens no more."""
+        if self._open is not None:
+            self._open.close()
+            self._open = None
+
+    def status(self) -> dict[str, Any]:
+        """Whether it listens, and why not."""
+        return {"open": self._open is not None, "why": self._why}
