@@ -80,7 +80,17 @@ def test_what_drives_say_is_in_the_database_once(tmp_path: Path, postgres: Serve
     service.end()
     serving.join()
     with Spool(tmp_path / "drivebus-spool", 1 << 30, heard.append) as spool, closing(spool.reader("test")) as reader:
-        kept = [(each.epoch, each.seq, each.layout.drive, each.missing) for each in reader.after(0, 100_000)]
+        found = reader.after(0, 100_000)
+    kept = [(each.epoch, each.seq, each.layout.drive, each.missing) for each in found]
+    events = {
+        (each.epoch, each.seq, each.layout.drive, each.layout.event, each.missing)
+        for each in found
+        if each.layout.event
+    }
+    told = postgres.ask("SELECT epoch, seq, subject, kind, text FROM drivebus.event WHERE gateway = 'hall 1'")
+    assert len(set(told)) == len(told)
+    assert set(told) <= events
+    assert {("hall", "open"), ("ghost", "gone")} <= {(subject, kind) for _, _, subject, kind, _ in told}
     rows: list[tuple[object, ...]] = []
     for table in ("gd350", "vfd500"):
         rows += postgres.ask(f"SELECT epoch, seq, drive, missing FROM drivebus.{table} WHERE gateway = 'hall 1'")

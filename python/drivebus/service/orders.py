@@ -178,7 +178,7 @@ class Orders:
             return Outcome("not sent", why)
         charge = self._charges.get(order.drive)
         if charge is None:
-            return Outcome("not sent", "its line is away")
+            return Outcome("not sent", self._why_away(order.drive))
         try:
             if order.what in HALTS:
                 self._halt(charge, order.what)
@@ -191,6 +191,11 @@ class Orders:
         except DrivebusError as error:
             return Outcome("may have been done" if error.may_have_taken else "not sent", str(error))
         return Outcome("done", "")
+
+    def _why_away(self, name: str) -> str:
+        if self._drives[name].read_only:
+            return "it is read_only in the file"
+        return "it has no profile in the file" if self._drives[name].profile is None else "its line is away"
 
     def _in_time(self, charge: _Charge, until: float) -> None:
         """Waits for the line with a read, so that what had to wait too long for it is known before it is sent."""

@@ -9,7 +9,7 @@ from psycopg import Copy
 
 from drivebus.spool import Spooled
 
-__all__ = ["FIXED", "clean", "write"]
+__all__ = ["FIXED", "clean", "write", "write_events"]
 
 FIXED = {
     "gateway": "text NOT NULL",
@@ -22,6 +22,7 @@ FIXED = {
 }
 """The columns that each table of samples begins with, and what they are."""
 
+_OF_EVENT = ("text", "text", "int8", "timestamptz", "text", "text", "text")
 _TYPES = ("text", "text", "int8", "timestamptz", "float8", "text", "text")
 _YEAR_9999 = 253_370_764_800.0
 _NEVER = datetime.max.replace(tzinfo=timezone.utc)
@@ -36,6 +37,13 @@ def write(copy: Copy, gateway: str, samples: Sequence[Spooled]) -> None:
         cells = nothing if missing else values
         drive = clean(layout.drive)
         copy.write_row((gateway, epoch, seq, _moment(at), took, drive, clean(missing) if missing else None, *cells))
+
+
+def write_events(copy: Copy, gateway: str, events: Sequence[Spooled]) -> None:
+    """Writes *events* into the columns of their table, as they stand there."""
+    copy.set_types(_OF_EVENT)
+    for seq, epoch, layout, at, _, text, _ in events:
+        copy.write_row((gateway, epoch, seq, _moment(at), clean(layout.drive), clean(layout.event), clean(text)))
 
 
 def clean(text: str) -> str:

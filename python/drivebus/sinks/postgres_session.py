@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import socket
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from psycopg import errors, sql
 from drivebus.errors import NotAllowed
 from drivebus.sinks.intervals import Change, Intervals
 from drivebus.sinks.postgres_link import connection_string
-from drivebus.sinks.postgres_rows import clean, write
+from drivebus.sinks.postgres_rows import clean, write, write_events
 from drivebus.sinks.postgres_tables import Tables
 from drivebus.spool import Spooled
 
@@ -118,20 +118,34 @@ class Session:
         return self._inside
 
     def _put(self, connection: psycopg.Connection[Any], tables: Tables, samples: Sequence[Spooled]) -> None:
-        groups = _groups(samples)
-        tables.take_in({id(sample.layout): sample.layout for sample in samples}.values())
+        events = [each for each in samples if each.layout.event]
+        groups = _groups([each for each in samples if not each.layout.event])
+        tables.take_in({id(some[0].layout): some[0].layout for some in groups.values()}.values())
         connection.execute(_BEGIN)
         for epoch, first, last in _runs(samples):
             change = self._inside.setdefault(epoch, Intervals()).add(first, last)
             self._write_down(connection, tables.reached, epoch, change)
         for (family, names), group in groups.items():
-            table = tables.of_family(family)
-            rest = self._without_known(connection, table, group) if self._is_careful else group
-            if rest:
-                statement = sql.SQL("COPY {} ({}) FROM STDIN (FORMAT BINARY)").format(table, tables.columns(names))
-                with connection.cursor() as cursor, cursor.copy(statement) as copy:
-                    write(copy, self._gateway, rest)
+            into = sql.SQL(" ({})").format(tables.columns(names))
+            self._copy(connection, tables.of_family(family), into, group, write)
+        if events:
+            self._copy(connection, tables.event, sql.SQL(""), events, write_events)
         connection.execute("COMMIT")
+
+    def _copy(
+        self,
+        connection: psycopg.Connection[Any],
+        table: sql.Identifier,
+        columns: sql.Composable,
+        samples: Sequence[Spooled],
+        write_them: Callable[[psycopg.Copy, str, Sequence[Spooled]], None],
+    ) -> None:
+        """Copies *samples* into the *columns* of *table*; none that it has."""
+        rest = self._without_known(connection, table, samples) if self._is_careful else samples
+        if rest:
+            statement = sql.SQL("COPY {}{} FROM STDIN (FORMAT BINARY)").format(table, columns)
+            with connection.cursor() as cursor, cursor.copy(statement) as copy:
+                write_them(copy, self._gateway, rest)
 
     def _write_down(
         self, connection: psycopg.Connection[Any], reached: sql.Identifier, epoch: str, change: Change

@@ -1,4 +1,4 @@
-"""The tables of a PostgreSQL database: a wide one for each family, the view over all, and which samples are in.
+"""The tables of a PostgreSQL database: a wide one for each family, events, the view over all, and which samples are in.
 
 What is there is left as it is, so that a user without the right to make tables can deliver into those that an owner
 made. Whatever is missing is made, and nothing is ever removed.
@@ -27,8 +27,12 @@ _NO_COLUMNS = frozenset({*FIXED, "", "tableoid", "xmin", "cmin", "xmax", "cmax",
 """What no value's column is called: those of each table, and PostgreSQL's own."""
 _REACHED = """CREATE TABLE {} (gateway text, epoch text, first bigint, last bigint NOT NULL CHECK (last >= first),
     PRIMARY KEY (gateway, epoch, first))"""
+_EVENT = """CREATE TABLE {} (gateway text NOT NULL, epoch text NOT NULL, seq bigint NOT NULL, time timestamptz NOT NULL,
+    subject text NOT NULL, kind text NOT NULL, text text NOT NULL, PRIMARY KEY (gateway, epoch, seq))"""
 _NARROW = """SELECT sample.time, sample.gateway, sample.drive, each.name, each.value FROM {} sample
     CROSS JOIN LATERAL (VALUES {}) each (name, value) WHERE each.value IS NOT NULL"""
+_BY_TIME = "CREATE INDEX ON {} USING brin (time)"
+"""Small, and enough: samples and events come in the order of their times."""
 _EMPTY = sql.SQL(
     "SELECT NULL::timestamptz AS time, NULL::text AS gateway, NULL::text AS drive, NULL::text AS name,"
     " NULL::double precision AS value WHERE false"
@@ -65,6 +69,11 @@ class Tables:
         """The table that says which samples are in."""
         return self._named("reached")
 
+    @property
+    def event(self) -> sql.Identifier:
+        """The table of events."""
+        return self._named("event")
+
     def of_family(self, family: str) -> sql.Identifier:
         """The table of a family; of drives without a profile, too."""
         return self._named(_table(family))
@@ -75,7 +84,7 @@ class Tables:
 
     def prepare(self) -> None:
         """Makes what there is for any family."""
-        if not ({"reached", "narrow"} <= self._relations()):
+        if not ({"reached", "event", "narrow"} <= self._relations()):
             self._make(())
 
     def take_in(self, layouts: Iterable[Layout]) -> None:
@@ -105,6 +114,9 @@ class Tables:
             connection.execute(sql.SQL("CREATE SCHEMA {}").format(sql.Identifier(self._schema)))
         if "reached" not in self._relations():
             connection.execute(sql.SQL(_REACHED).format(self.reached))
+        if "event" not in self._relations():
+            connection.execute(sql.SQL(_EVENT).format(self.event))
+            connection.execute(sql.SQL(_BY_TIME).format(self.event))
         self._columns.clear()
         for layout in layouts:
             self._make_columns(layout)
@@ -121,8 +133,7 @@ class Tables:
             self._connection.execute(
                 sql.SQL("CREATE TABLE {} ({}, PRIMARY KEY (gateway, epoch, seq))").format(table, fixed)
             )
-            # Small, and enough: samples come in the order of their times.
-            self._connection.execute(sql.SQL("CREATE INDEX ON {} USING brin (time)").format(table))
+            self._connection.execute(sql.SQL(_BY_TIME).format(table))
         added = [name for name in lacking if name not in FIXED]
         if added:
             parts = (sql.SQL("ADD COLUMN IF NOT EXISTS {} double precision").format(sql.Identifier(n)) for n in added)
