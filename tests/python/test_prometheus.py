@@ -103,6 +103,18 @@ def test_what_one_poll_had_is_not_shown_when_the_drive_is_gone(told: tuple[list[
     assert not any(name.startswith("drivebus_running_frequency") for name, _ in found)
 
 
+@pytest.mark.parametrize(
+    ("state", "fault", "shown"), [("stopped", "", 0), ("fault", "OL1 (11): overload", 1), ("", "", None)]
+)
+def test_a_fault_is_told_where_one_can_be_seen(
+    told: tuple[list[Picture], Prometheus], state: str, fault: str, shown: float | None
+) -> None:
+    pictures, prometheus = told
+    drive = DrivePicture(1, ONE, 10.0, "", (50,), state, fault)
+    pictures.append(Picture(11.0, (LinePicture("hall", True, {}, (drive,)),)))
+    assert scraped(prometheus.port).get(series("drivebus_drive_in_fault", line="hall", drive="fan")) == shown
+
+
 def test_a_name_that_ends_like_another_kind_of_metric(told: tuple[list[Picture], Prometheus]) -> None:
     pictures, prometheus = told
     pictures.append(Picture(11.0, (LinePicture("hall", True, {}, (DrivePicture(1, COUNTS, 10.0, "", (3, 4)),)),)))

@@ -125,6 +125,8 @@ class _Collector:
                 _tell_asked(families, line.name, drive, picture.time)
                 if not last[drive.layout.drive].missing:
                     _tell_values(families, line.name, drive)
+            for drive in last.values():
+                _tell_state(families, line.name, drive)
         families.count("drivebus_spooled_samples", "Samples that were kept for others.", {}, picture.spooled)
         families.count("drivebus_lost_samples", "Samples that gave way: file or disk was full.", {}, picture.lost)
         yield from families
@@ -180,6 +182,13 @@ def _tell_asked(families: _Families, line: str, drive: DrivePicture, now: float)
     families.gauge("drivebus_drive_up", up, where, float(not drive.missing))
     asked = "How long ago the drive was asked, by poll."
     families.gauge("drivebus_sample_age_seconds", asked, {**where, "poll": str(drive.poll)}, age)
+
+
+def _tell_state(families: _Families, line: str, drive: DrivePicture) -> None:
+    if drive.state or drive.fault:
+        where = {"line": line, "drive": drive.layout.drive}
+        told = "Whether the drive is in a fault; of one that does not answer nothing is known."
+        families.gauge("drivebus_drive_in_fault", told, where, float(bool(drive.fault)))
 
 
 def _tell_values(families: _Families, line: str, drive: DrivePicture) -> None:

@@ -21,13 +21,16 @@ __all__ = ["COMMANDS"]
 
 
 @click.command()
+@click.argument("file", required=False)
 @click.option("--check", "checks", is_flag=True, help="Say what is wrong in the file, and end. Nothing is opened.")
 @click.option("--status", "shows", is_flag=True, help="Say how the service does that runs, and end.")
 @click.option("--for", "duration", type=Seconds(0), metavar="SECONDS", help="Stop after so long.")
 @click.pass_context
 @pass_session
-def serve(session: Session, context: click.Context, checks: bool, shows: bool, duration: float | None) -> None:
-    """Serve the lines of drivebus.toml, until Ctrl-C or SIGTERM: for a service.
+def serve(
+    session: Session, context: click.Context, file: str | None, checks: bool, shows: bool, duration: float | None
+) -> None:
+    """Serve the lines of drivebus.toml, or of FILE, until Ctrl-C or SIGTERM: for a service.
 
     Other programs use the lines through it, and clients of Modbus TCP as [[share.tcp]] says. What happens is told on
     standard error. A motor that a client set in motion is halted when the service ends.
@@ -36,7 +39,10 @@ def serve(session: Session, context: click.Context, checks: bool, shows: bool, d
 
     if checks and shows:
         raise WrongUse("--check looks at the file and --status at the service: give one of them")
-    site = find_site(context.find_root().params.get("config"), needed=True)
+    config = context.find_root().params.get("config")
+    if file is not None and config is not None:
+        raise WrongUse(f"{file} and --config {config} are two files: give one of them")
+    site = find_site(file or config, needed=True)
     if shows:
         _show(session, service.read_status(site))
         return
