@@ -20,7 +20,7 @@ from drivebus import Simulator
 from drivebus.service import Service
 from drivebus.site import Site
 
-from .conftest import TOOLS, lacking
+from .conftest import ROOT, TOOLS, lacking
 
 PLANT = """
 [lines.hall]
@@ -137,3 +137,20 @@ def test_it_knows_who_is_up_and_at_which_voltage(metrics: int, tmp_path: Path) -
         assert ask("drivebus_bus_voltage_volts") == {"pump": 537}
         assert ask("up") == {"": 1}
         assert all(age < 30 for age in ask("drivebus_sample_age_seconds").values())
+
+
+def questions() -> list[str]:
+    """What the dashboard for Grafana asks Prometheus, of all drives."""
+    board = json.loads((ROOT / "examples/grafana/prometheus.json").read_text())
+    asked = [target["expr"] for panel in board["panels"] for target in panel["targets"]]
+    return [each.replace("$drive", ".*") for each in asked]
+
+
+def test_the_dashboard_shows_all_that_it_asks_for(metrics: int, tmp_path: Path) -> None:
+    with prometheus(metrics, tmp_path) as ask:
+        asked = questions()
+        assert len(asked) == 9
+        # A rate needs two scrapes. Of a VFD500 neither state nor current is proved, so neither is asked for.
+        until(lambda: all(ask(each) for each in asked))
+        assert ask(asked[0]) == {"pump": 1, "fan": 1, "ghost": 0}
+        assert ask(asked[1]) == {"pump": 0}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from collections.abc import Iterator
 from contextlib import closing
@@ -15,7 +16,7 @@ from drivebus.service import Service, check
 from drivebus.site import Site
 from drivebus.spool import Spool
 
-from .postgres_server import Server, server
+from .postgres_server import ROOT, Server, server
 from .tcp_client import seen
 
 PLANT = """
@@ -129,3 +130,41 @@ def test_a_mistake_is_told_and_no_secret_with_it(tmp_path: Path, old: str, new: 
         check(Site.load(file))
     assert said in str(caught.value)
     assert "secret" not in str(caught.value)
+
+
+def asked_by_grafana() -> Iterator[tuple[str, str]]:
+    """Each question of the dashboard by its title, with what Grafana puts for its variables."""
+    board = json.loads((ROOT / "examples/grafana/postgres.json").read_text(encoding="utf-8"))
+    told = [(each["name"], each["query"]) for each in board["templating"]["list"] if each["type"] == "query"]
+    told += [(panel["title"], target["rawSql"]) for panel in board["panels"] for target in panel["targets"]]
+    put = {
+        "$__timeFilter(time)": "time BETWEEN now() - INTERVAL '1 hour' AND now()",
+        "$gateway": "hall 1",
+        "($drive)": "('pump','fan','ghost')",
+        "($name)": "('fault_code')",
+    }
+    for title, question in told:
+        for variable, value in put.items():
+            question = question.replace(variable, value)
+        assert "$" not in question
+        yield title, question
+
+
+def test_the_dashboard_shows_what_is_in(tmp_path: Path, postgres: Server) -> None:
+    file = tmp_path / "drivebus.toml"
+    heard: list[str] = []
+    with Simulator({1: "gd350", 2: "vfd500"}, transport="tcp", baudrate=115200) as simulator:
+        file.write_text(PLANT.format(port=simulator.port, conninfo=postgres.conninfo))
+        service = Service(Site.load(file), heard.append)
+        serving = threading.Thread(target=service.run)
+        serving.start()
+        seen(lambda: service.status()["outlets"]["postgres"]["delivered"] > 10)
+        service.end()
+        serving.join()
+    shown = {title: postgres.ask(question) for title, question in asked_by_grafana()}
+    assert shown["gateway"] == [("hall 1",)]
+    assert shown["drive"] == [("fan",), ("pump",)]
+    assert ("bus_voltage",) in shown["name"]
+    assert {row[1] for row in shown["Values"]} == {"pump fault_code", "fan fault_code"}
+    assert {drive: age < 3_600 for drive, _, age in shown["Told last"]} == {"fan": True, "pump": True}
+    assert {row[1:3] for row in shown["Events"]} >= {("hall", "open"), ("ghost", "gone")}
