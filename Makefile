@@ -29,7 +29,7 @@ RUST_TESTED := --workspace --exclude drivebus-benches
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo docs try-docs test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
-        machine screens format schema types layers rust-lint other-types rust-build rust-test counts counts-update python-collect python-test interop-parts examples wheel-smoke \
+        machine screens format schema types layers rust-lint other-types rust-build rust-test counts counts-update python-collect python-test beside-tests interop-parts examples wheel-smoke \
         pictures matrix semver sdist release-check release-readme archives publish-crates wheels wheels-check cross-check
 
 help: ## what can be made
@@ -62,15 +62,18 @@ help: ## what can be made
 demo: $(VENV)/.wheel
 	$(BIN)/drivebus demo
 
-# What is downloaded and built goes three at a time: a download, or the end of a link, leaves a core idle. No two of them need
-# the same lock: one target folder of cargo each, and one pip. What is tested goes alone, so that nothing but the test makes
-# it wait.
+# What is downloaded and built goes several at a time: a download, or the end of a link, leaves a core idle. No two of them need
+# the same lock: one target folder of cargo each, and one pip. Python's tests wait for lines half of their time: what computes
+# and can wait is done beside them, and gives way to them.
 AT_ONCE := $(MAKE) --no-print-directory --jobs=3
 test:
-	@$(AT_ONCE) rust-lint dist/.wheel $(VENV)/.dev layers
-	@$(AT_ONCE) rust-build types interop-parts python-collect
-	@$(MAKE) --no-print-directory rust-test counts python-test examples wheel-smoke
+	@$(AT_ONCE) rust-lint dist/.wheel $(VENV)/.dev interop-parts
+	@$(AT_ONCE) python-test beside-tests
+	@$(MAKE) --no-print-directory rust-test examples wheel-smoke
 	@echo "make test: every check passed"
+
+beside-tests: $(VENV)/.dev $(VENV)/.wheel
+	@nice -n 15 $(MAKE) --no-print-directory types layers rust-build counts
 
 # What is for other systems is looked at here and not by `make test`, which has to be quick. The compiler for them is Debian 12's.
 lint: layers rust-lint types other-types $(if $(filter 12.%,$(shell cat /etc/debian_version 2>/dev/null)),cross-check)
@@ -162,7 +165,7 @@ python-collect: $(VENV)/.dev $(VENV)/.wheel
 
 # Most of these tests wait for a line and not for a core, so five files at a time take half as long as two. A file stays together:
 # its tests share what it set up. Benchmarks are none of them, and their plug-in cannot stand company.
-python-test: $(VENV)/.dev $(VENV)/.wheel interop-parts
+python-test: python-collect interop-parts
 	$(PYTEST) -n $(PYTEST_JOBS) --dist loadfile --no-loadscope-reorder
 
 examples: $(VENV)/.wheel

@@ -11,6 +11,7 @@ import functools
 import importlib.util
 import itertools
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Coroutine, Iterator, Mapping
@@ -46,6 +47,7 @@ LINES = [*TRANSPORTS, pytest.param("shared", marks=NO_PTY)]
 # Seconds for an answer. Behind a port a thread of the simulator has to run for it; on a busy machine that takes long.
 IN_PROCESS, BEHIND_A_PORT = 0.25, 0.5
 _NUMBERS = itertools.count()
+_ROOM = 1 << 30
 RAMP = 1.0  # seconds to 50 Hz; short, because two of three lines run in real time
 
 
@@ -124,6 +126,17 @@ def folder() -> Iterator[Path]:
     """Where the programs of one test meet."""
     with meeting_in_a_folder_of_its_own() as folder:
         yield folder
+
+
+@pytest.fixture
+def quick_folder(tmp_path: Path) -> Iterator[Path]:
+    """A folder of one test: in memory where there is room, for what writes a thousand times through to the disk."""
+    memory = Path("/dev/shm")
+    if not memory.is_dir() or shutil.disk_usage(memory).free < _ROOM:
+        yield tmp_path
+        return
+    with tempfile.TemporaryDirectory(prefix="drivebus-", dir=memory) as folder:
+        yield Path(folder)
 
 
 @pytest.fixture(params=LINES)

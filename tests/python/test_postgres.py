@@ -41,8 +41,8 @@ def schema() -> str:
 
 
 @pytest.fixture
-def spool(tmp_path: Path) -> Iterator[Spool]:
-    with Spool(tmp_path / "spool", SIZE, quiet) as spool:
+def spool(quick_folder: Path) -> Iterator[Spool]:
+    with Spool(quick_folder / "spool", SIZE, quiet) as spool:
         yield spool
 
 
@@ -182,8 +182,8 @@ def test_commits_whose_answer_is_lost(spool: Spool, postgres: Server, way: Way, 
     assert given < 1.0 or not any("duplicate" in each for each in told)
 
 
-def test_a_program_that_is_killed_at_any_moment(tmp_path: Path, postgres: Server, schema: str) -> None:
-    path = tmp_path / "spool"
+def test_a_program_that_is_killed_at_any_moment(quick_folder: Path, postgres: Server, schema: str) -> None:
+    path = quick_folder / "spool"
     command = [sys.executable, "-m", "tests.python.delivering", postgres.conninfo, schema, str(path)]
     with subprocess.Popen(
         command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={**os.environ}
@@ -208,8 +208,8 @@ def test_a_program_that_is_killed_at_any_moment(tmp_path: Path, postgres: Server
         assert delivered(postgres, schema) == rows
 
 
-def test_a_spool_that_is_cut_anywhere(tmp_path: Path, postgres: Server, schema: str) -> None:
-    path, log = tmp_path / "spool", tmp_path / "spool-wal"
+def test_a_spool_that_is_cut_anywhere(quick_folder: Path, postgres: Server, schema: str) -> None:
+    path, log = quick_folder / "spool", quick_folder / "spool-wal"
     everything: Rows = {}
     for _ in range(100):
         with Spool(path, SIZE, quiet) as spool, closing(spool.reader("test")) as reader:
@@ -228,8 +228,8 @@ def test_a_spool_that_is_cut_anywhere(tmp_path: Path, postgres: Server, schema: 
     assert len({epoch for epoch, _ in everything}) == 100
 
 
-def test_what_gave_way_is_not_waited_for(tmp_path: Path, postgres: Server, schema: str) -> None:
-    with Spool(tmp_path / "spool", 200_000, quiet) as spool, closing(spool.reader("test")) as reader:
+def test_what_gave_way_is_not_waited_for(quick_folder: Path, postgres: Server, schema: str) -> None:
+    with Spool(quick_folder / "spool", 200_000, quiet) as spool, closing(spool.reader("test")) as reader:
         with delivering(spool, postgres, schema):
             feed(spool, 100)
         while spool.lost < 500:

@@ -38,8 +38,8 @@ def schema() -> str:
 
 
 @pytest.fixture
-def spool(tmp_path: Path) -> Iterator[Spool]:
-    with Spool(tmp_path / "spool", SIZE, quiet) as spool:
+def spool(quick_folder: Path) -> Iterator[Spool]:
+    with Spool(quick_folder / "spool", SIZE, quiet) as spool:
         yield spool
 
 
@@ -271,8 +271,8 @@ def test_two_that_deliver_as_the_same_gateway_double_nothing(spool: Spool, postg
     equal(spool, postgres, schema)
 
 
-def test_gateways_that_make_the_same_tables_at_once(tmp_path: Path, postgres: Server, schema: str) -> None:
-    spools = [Spool(tmp_path / f"spool {number}", SIZE, quiet) for number in range(4)]
+def test_gateways_that_make_the_same_tables_at_once(quick_folder: Path, postgres: Server, schema: str) -> None:
+    spools = [Spool(quick_folder / f"spool {number}", SIZE, quiet) for number in range(4)]
     settings = [PostgresSettings(postgres.conninfo, f"gateway {number}", schema) for number in range(4)]
     sinks = [Postgres(*each, quiet) for each in zip(spools, settings, strict=True)]
     expected: Rows = {}
@@ -297,11 +297,11 @@ def test_a_database_that_has_not_every_character(spool: Spool, postgres: Server,
 
 
 def test_a_password_comes_from_a_file_and_is_never_said(
-    spool: Spool, postgres: Server, schema: str, told: list[str], tmp_path: Path
+    spool: Spool, postgres: Server, schema: str, told: list[str], quick_folder: Path
 ) -> None:
     postgres.ask(f"GRANT CREATE ON DATABASE postgres TO {SECRET}")
     conninfo = postgres.conninfo.replace("owner", SECRET)
-    file = tmp_path / "password"
+    file = quick_folder / "password"
     file.write_text("not this\n")
     file.chmod(0o600)
     settings = PostgresSettings(conninfo, "gateway 1", schema, file)

@@ -93,8 +93,8 @@ def test_what_is_kept(steps: list[tuple[int, str, int]], band: int, heartbeat: i
         last = new if expected else last
 
 
-def test_a_reader_gets_them_in_order_from_where_it_was(tmp_path: Path) -> None:
-    with Spool(tmp_path / "spool", 1 << 30, told) as spool:
+def test_a_reader_gets_them_in_order_from_where_it_was(quick_folder: Path) -> None:
+    with Spool(quick_folder / "spool", 1 << 30, told) as spool:
         for turn in range(10):
             spool.add(PUMP, 100.0 + turn, 0.02, "", [turn / 100, 1.5, 3])
         spool.add(PUMP, 110.0, 0.5, "unit 1: no answer", [])
@@ -109,18 +109,18 @@ def test_a_reader_gets_them_in_order_from_where_it_was(tmp_path: Path) -> None:
         assert reader.after(10, 5)[0][2:] == (PUMP, 110.0, 0.5, "unit 1: no answer", ())
         reader.reached(5)
         reader.close()
-    with Spool(tmp_path / "spool", 1 << 30, told) as spool:
+    with Spool(quick_folder / "spool", 1 << 30, told) as spool:
         assert (spool.reader("a").position(), spool.reader("b").position()) == (5, 0)
         spool.add(PUMP, 111.0, 0.02, "", [0, 0, 0])
         spool.commit()
         assert spool.last == 12
         assert len({each.epoch for each in all_of(spool)}) == 2
-    assert (tmp_path / "spool").stat().st_mode & 0o777 == 0o600
+    assert (quick_folder / "spool").stat().st_mode & 0o777 == 0o600
 
 
-def test_the_oldest_give_way_where_it_is_full(tmp_path: Path) -> None:
+def test_the_oldest_give_way_where_it_is_full(quick_folder: Path) -> None:
     heard: list[str] = []
-    with Spool(tmp_path / "spool", 200_000, heard.append) as spool:
+    with Spool(quick_folder / "spool", 200_000, heard.append) as spool:
         for turn in range(100):
             for each in range(100):
                 spool.add(PUMP, float(turn * 100 + each), 0.02, "", [1, 2, 3])
@@ -129,16 +129,16 @@ def test_the_oldest_give_way_where_it_is_full(tmp_path: Path) -> None:
         assert kept[-1].seq == 10_000
         assert spool.lost == 10_000 - len(kept) == kept[0].seq - 1
         assert 2_000 < len(kept) < 8_000
-    assert (tmp_path / "spool").stat().st_size < 300_000
+    assert (quick_folder / "spool").stat().st_size < 300_000
     assert "is full: its oldest" in heard[0]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limits of files")
-def test_a_disk_that_takes_nothing_is_told_once_and_nothing_is_lost(tmp_path: Path) -> None:
+def test_a_disk_that_takes_nothing_is_told_once_and_nothing_is_lost(quick_folder: Path) -> None:
     import resource
 
     heard: list[str] = []
-    with Spool(tmp_path / "spool", 1 << 30, heard.append) as spool:
+    with Spool(quick_folder / "spool", 1 << 30, heard.append) as spool:
         spool.add(PUMP, 1.0, 0.02, "", [1, 2, 3])
         spool.commit()
         limits = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -175,18 +175,18 @@ while True:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
-def test_what_was_committed_outlives_a_kill(tmp_path: Path) -> None:
+def test_what_was_committed_outlives_a_kill(quick_folder: Path) -> None:
     chance = random.Random(1)
     had = 0
     for _ in range(5):
-        line = [sys.executable, "-c", WRITES, str(tmp_path / "spool")]
+        line = [sys.executable, "-c", WRITES, str(quick_folder / "spool")]
         with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as program:
             assert program.stdout is not None
             for _ in range(chance.randrange(1, 40)):
                 last = int(program.stdout.readline())
             os.kill(program.pid, signal.SIGKILL)
             last = max([last, *map(int, program.stdout.read().split("\n")[:-1])])
-        with Spool(tmp_path / "spool", 1 << 30, told) as spool:
+        with Spool(quick_folder / "spool", 1 << 30, told) as spool:
             kept = all_of(spool)
             assert [each.seq for each in kept] == list(range(1, len(kept) + 1))
             assert len(kept) >= last
@@ -194,9 +194,9 @@ def test_what_was_committed_outlives_a_kill(tmp_path: Path) -> None:
             had = len(kept)
 
 
-def test_cut_anywhere_it_gives_what_is_whole(tmp_path: Path) -> None:
+def test_cut_anywhere_it_gives_what_is_whole(quick_folder: Path) -> None:
     """A cut file either opens as it was, or is put aside; no sample is made up, and the next ones are kept."""
-    whole = tmp_path / "whole"
+    whole = quick_folder / "whole"
     with Spool(whole, 1 << 30, told) as spool:
         for turn in range(3_000):
             spool.add(PUMP, float(turn), 0.02, "", [turn / 100, turn / 10, turn])
@@ -208,7 +208,7 @@ def test_cut_anywhere_it_gives_what_is_whole(tmp_path: Path) -> None:
     size = whole.stat().st_size
     saved = []
     for turn in range(100):
-        cut = tmp_path / f"cut-{turn}"
+        cut = quick_folder / f"cut-{turn}"
         shutil.copy(whole, cut)
         with cut.open("r+b") as file:
             file.truncate(chance.randrange(size))
@@ -227,36 +227,36 @@ def test_cut_anywhere_it_gives_what_is_whole(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "content", [b"a text of somebody else's, long enough for a header of SQLite\n" * 100, b"\0" * 5_000]
 )
-def test_what_is_no_spool_is_put_aside(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "spool"
+def test_what_is_no_spool_is_put_aside(quick_folder: Path, content: bytes) -> None:
+    path = quick_folder / "spool"
     path.write_bytes(content)
     heard: list[str] = []
     with Spool(path, 1 << 30, heard.append) as spool:
         assert all_of(spool) == []
-    assert (tmp_path / "spool.damaged-1").read_bytes() == content
+    assert (quick_folder / "spool.damaged-1").read_bytes() == content
     assert "was damaged: 0 samples" in heard[0]
 
 
-def test_what_cannot_be_opened_is_said(tmp_path: Path) -> None:
+def test_what_cannot_be_opened_is_said(quick_folder: Path) -> None:
     with pytest.raises(OSError, match="No such file"):
-        Spool(tmp_path / "none" / "spool", 1 << 30, told)
-    (tmp_path / "folder").mkdir()
+        Spool(quick_folder / "none" / "spool", 1 << 30, told)
+    (quick_folder / "folder").mkdir()
     with pytest.raises(NotAllowed, match="cannot be opened"):
-        Spool(tmp_path / "folder", 1 << 30, told)
+        Spool(quick_folder / "folder", 1 << 30, told)
 
 
-def test_a_sample_that_is_not_as_it_was_written_is_told_and_gives_no_values(tmp_path: Path) -> None:
-    with Spool(tmp_path / "spool", 1 << 30, told) as spool:
+def test_a_sample_that_is_not_as_it_was_written_is_told_and_gives_no_values(quick_folder: Path) -> None:
+    with Spool(quick_folder / "spool", 1 << 30, told) as spool:
         for turn in range(3):
             spool.add(PUMP, float(turn), 0.02, "", [1, 2, 3])
         spool.commit()
-    base = sqlite3.connect(tmp_path / "spool")
+    base = sqlite3.connect(quick_folder / "spool")
     base.execute("UPDATE sample SET packed = zeroblob(13) WHERE seq = 2")
     base.execute("INSERT INTO layout VALUES (9, 'no layout')")
     row = (1, 9, 5.0, 0.02, "", b"i")
     base.execute("INSERT INTO sample VALUES (4, ?, ?, ?, ?, ?, ?, ?)", (*row, proof_of(*row)))
     base.commit()
     base.close()
-    with Spool(tmp_path / "spool", 1 << 30, told) as spool:
+    with Spool(quick_folder / "spool", 1 << 30, told) as spool:
         assert [each.missing for each in all_of(spool)] == ["", DAMAGED, "", DAMAGED]
         assert [each.values for each in all_of(spool)] == [(1, 2, 3), (), (1, 2, 3), ()]
