@@ -333,11 +333,16 @@ def counted(value: Value, scale: float) -> str:
     """*value* with as many digits after the point as a drive counts that has *scale* counts per unit."""
     if isinstance(value, int):
         return str(int(value))
+    shown = f"{value:.{digits_of(scale)}f}"
+    return shown if float(shown) == value else repr(value)
+
+
+def digits_of(scale: float) -> int:
+    """How many digits after the point a value has of a drive that has *scale* counts per unit; 9 at most."""
     digits = 0
     while digits < 9 and 10**digits < scale:
         digits += 1
-    shown = f"{value:.{digits}f}"
-    return shown if float(shown) == value else repr(value)
+    return digits
 
 
 def group_of(code: str) -> str:

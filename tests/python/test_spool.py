@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 
 from drivebus.errors import NotAllowed
 from drivebus.service.changes import Changes
-from drivebus.service.polling import digits_of
 from drivebus.spool import Layout, Spool, Spooled
 from drivebus.spool.proof import proof_of
+from drivebus.values import digits_of
 
 PUMP = Layout("pump", "gd350", ("running_frequency", "output_current", "state"), ("Hz", "A", ""), (2, 1, 0))
 DAMAGED = "damaged in the spool"
@@ -65,7 +65,7 @@ def test_what_is_no_sample_is_an_error(packed: bytes) -> None:
         assert len(packed) not in (13, 25) or packed[:1] not in (b"i", b"d")
 
 
-@pytest.mark.parametrize(("scale", "digits"), [(1, 0), (10, 0), (0.1, 1), (0.01, 2), (0.001, 3), (0.05, 2), (1e-05, 5)])
+@pytest.mark.parametrize(("scale", "digits"), [(1, 0), (0.1, 0), (10, 1), (100, 2), (1_000, 3), (20, 2), (1e5, 5)])
 def test_how_many_digits_a_scale_has(scale: float, digits: int) -> None:
     assert digits_of(scale) == digits
 

@@ -15,7 +15,7 @@ from drivebus.profile.evidence import Evidence
 from drivebus.profile.plan import labelled
 from drivebus.values import Snapshot, Value
 
-__all__ = ["contradiction", "monitor", "read", "readable", "settled_profile", "snapshot", "value"]
+__all__ = ["contradiction", "monitor", "monitored", "read", "readable", "settled_profile", "snapshot", "value"]
 
 
 def value(unit: DriveView, name: str, raw: int) -> Value:
@@ -87,7 +87,7 @@ def readable(unit: DriveView, *names: str) -> list[str]:
     """See `Drive.readable`."""
     if not names:
         # The same each time, and looked up for every sample of a monitor.
-        return list(unit.evidence.cached(_monitored))
+        return monitored(unit.evidence)
     unit.evidence.require_readable(names)
     for name in names:
         if unit_variants.is_open(unit, name):
@@ -128,6 +128,11 @@ async def contradiction(unit: DriveView) -> str | None:
         NoAnswer, BadAnswer, PortError: It did not tell.
     """
     return await unit.identity.contradiction(unit.bus)
+
+
+def monitored(evidence: Evidence) -> list[str]:
+    """The monitor registers that may be read of a unit of whose family that is known, and whose meaning is."""
+    return list(evidence.cached(_monitored))
 
 
 def _monitored(evidence: Evidence) -> Sequence[str]:

@@ -54,7 +54,7 @@ async def look(unit: DriveView, *, urgent: bool = False, unverified: bool = Fals
     """
     unit = unit.trusting(unverified)
     seen = await glance(unit, urgent=urgent)
-    if planned(unit).plan is None:
+    if planned(unit.evidence).plan is None:
         what = f"nothing of the state of unit {unit.address} may be read"
         raise unit.evidence.missing(what, seen.missing["state"], Evidence.without_state)
     return seen
@@ -62,7 +62,7 @@ async def look(unit: DriveView, *, urgent: bool = False, unverified: bool = Fals
 
 async def glance(unit: DriveView, *, urgent: bool = False) -> Look:
     """As `look`; where nothing may be read, nothing is, and nothing is told."""
-    plan = planned(unit)
+    plan = planned(unit.evidence)
     if plan.plan is None:
         return Look(State.UNKNOWN, {}, None, 0.0, plan.missing, False, None)
     answers: list[list[int]] = []
@@ -122,9 +122,9 @@ async def ping(unit: DriveView) -> None:
     raise BadArgument(f"nothing is known that {unit.profile.title} answers, so unit {unit.address} was not asked")
 
 
-def planned(unit: DriveView) -> _Plan:
-    """What a look at the unit reads."""
-    return unit.evidence.cached(_plan)
+def planned(evidence: Evidence) -> _Plan:
+    """What a look reads at a unit of whose family that is known."""
+    return evidence.cached(_plan)
 
 
 def _plan(evidence: Evidence) -> _Plan:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from decimal import Decimal
 from functools import partial
 from typing import Any
 
@@ -14,15 +13,18 @@ from drivebus.drive import Drive
 from drivebus.line.poll_samples import Sample
 from drivebus.operations import state
 from drivebus.operations.drive_base import unit_of
+from drivebus.operations.registers import monitored
 from drivebus.poll import Poll
+from drivebus.profile.evidence import Evidence
 from drivebus.service.changes import Changes
 from drivebus.service.events import Events
 from drivebus.service.handles import handle_of
 from drivebus.sinks.picture import DrivePicture
 from drivebus.site import SiteLine, SitePoll
 from drivebus.spool import Layout, Spool
+from drivebus.values import digits_of
 
-__all__ = ["Polling", "digits_of"]
+__all__ = ["Polling", "layout_of"]
 
 
 class Polling:
@@ -96,20 +98,11 @@ class _Series:
 
     def __init__(self, name: str, drive: Drive, poll: SitePoll) -> None:
         self._unit = unit_of(drive)
-        self._told = state.planned(self._unit)
-        asked = [*(poll.registers or drive.readable()), self._told.state, self._told.fault]
-        registers = list(dict.fromkeys(each for each in asked if each is not None))
-        rows = [drive.describe(register) for register in registers]
-        self.layout = Layout(
-            name,
-            drive.profile.name,
-            tuple(registers),
-            tuple(row.unit for row in rows),
-            tuple(digits_of(row.scale) for row in rows),
-        )
+        self._told = state.planned(self._unit.evidence)
+        self.layout = layout_of(name, self._unit.evidence, poll.registers)
         # The sample nearest to the heartbeat: none comes on time to the microsecond.
         heartbeat = poll.heartbeat - poll.interval / 2
-        self.changes = Changes([poll.band.get(register, 0.0) for register in registers], heartbeat)
+        self.changes = Changes([poll.band.get(register, 0.0) for register in self.layout.names], heartbeat)
 
     def read_off(self, sample: Sample[Drive]) -> tuple[str, str]:
         """What the drive is doing, and the fault that it is in, in words; empty what it does not tell."""
@@ -122,6 +115,12 @@ class _Series:
         return told, "a fault that it does not name" if in_fault else ""
 
 
-def digits_of(scale: float) -> int:
-    """How many digits behind the point a value has that counts in steps of *scale*."""
-    return max(0, -int(Decimal(repr(scale)).normalize().as_tuple().exponent))
+def layout_of(name: str, evidence: Evidence, registers: Sequence[str]) -> Layout:
+    """What the samples of the drive *name* have, which is asked for *registers*, or for what its family has to tell."""
+    told, profile = state.planned(evidence), evidence.profile
+    asked = [*(registers or monitored(evidence)), told.state, told.fault]
+    names = tuple(dict.fromkeys(each for each in asked if each is not None))
+    rows = [profile.describe(each) for each in names]
+    return Layout(
+        name, profile.name, names, tuple(row.unit for row in rows), tuple(digits_of(row.scale) for row in rows)
+    )
