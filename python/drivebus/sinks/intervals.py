@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-__all__ = ["Change", "Intervals"]
+from drivebus.spool import Spooled
+
+__all__ = ["Change", "Intervals", "runs"]
 
 
 class Change(NamedTuple):
@@ -46,3 +48,14 @@ class Intervals:
             first = max(first, end + 1)
         if first <= last:
             yield first, last
+
+
+def runs(samples: Sequence[Spooled]) -> Iterator[tuple[str, int, int]]:
+    """The epochs and numbers of *samples*, which are in their order, as runs without a gap."""
+    begin = before = samples[0]
+    for sample in samples[1:]:
+        if sample.epoch != before.epoch or sample.seq != before.seq + 1:
+            yield begin.epoch, begin.seq, before.seq
+            begin = sample
+        before = sample
+    yield begin.epoch, begin.seq, before.seq

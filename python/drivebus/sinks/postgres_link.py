@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import ipaddress
 import os
-import stat
 from pathlib import Path
 
 from psycopg import ProgrammingError
 from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
-from drivebus.errors import BadArgument, NotAllowed
+from drivebus.errors import BadArgument
+from drivebus.sinks.password_file import password_in
+from drivebus.sinks.this_computer import is_loopback
 
 __all__ = ["connection_string"]
 
@@ -42,7 +42,7 @@ def connection_string(given: str, application: str, password_file: Path | None) 
     if any(secret in told for secret in _SECRETS):
         raise BadArgument("a password does not belong into a connection string: put it into a file of its own")
     if password_file is not None:
-        told["password"] = _password(password_file)
+        told["password"] = password_in(password_file)
     settings = {**_UNLESS_GIVEN, "application_name": application, **told, "client_encoding": "UTF8"}
     if "sslmode" not in told and not os.environ.get("PGSSLMODE") and not _is_local(told):
         settings["sslmode"] = "verify-full"
@@ -59,22 +59,4 @@ def _is_local(told: dict[str, str]) -> bool:
 
 def _is_this_computer(host: str) -> bool:
     # Unix sockets are named by their folder or with an @; no name is such a socket, or localhost.
-    if host in ("", "localhost") or host[0] in "/@" or Path(host).is_absolute():
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
-
-
-def _password(path: Path) -> str:
-    try:
-        with path.open(encoding="utf-8") as file:
-            mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
-            password = file.readline().rstrip("\r\n")
-    except (OSError, ValueError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is no text"
-        raise NotAllowed(f"the password in {path} cannot be read: {why}") from None
-    if os.name == "posix" and mode & 0o077:
-        raise NotAllowed(f"others may read the password in {path}: run chmod 600 {path}")
-    return password
+    return host == "" or host[0] in "/@" or Path(host).is_absolute() or is_loopback(host)

@@ -16,7 +16,7 @@ import psycopg
 from psycopg import errors, sql
 
 from drivebus.errors import NotAllowed
-from drivebus.sinks.intervals import Change, Intervals
+from drivebus.sinks.intervals import Change, Intervals, runs
 from drivebus.sinks.postgres_link import connection_string
 from drivebus.sinks.postgres_rows import clean, write, write_events
 from drivebus.sinks.postgres_tables import Tables
@@ -122,7 +122,7 @@ class Session:
         groups = _groups([each for each in samples if not each.layout.event])
         tables.take_in({id(some[0].layout): some[0].layout for some in groups.values()}.values())
         connection.execute(_BEGIN)
-        for epoch, first, last in _runs(samples):
+        for epoch, first, last in runs(samples):
             change = self._inside.setdefault(epoch, Intervals()).add(first, last)
             self._write_down(connection, tables.reached, epoch, change)
         for (family, names), group in groups.items():
@@ -245,14 +245,3 @@ def _groups(samples: Sequence[Spooled]) -> dict[tuple[str, tuple[str, ...]], lis
         layout = some[0].layout
         groups.setdefault((layout.family, layout.names), []).extend(some)
     return groups
-
-
-def _runs(samples: Sequence[Spooled]) -> Iterator[tuple[str, int, int]]:
-    """The epochs and numbers of *samples*, which are in their order, as runs without a gap."""
-    begin = before = samples[0]
-    for sample in samples[1:]:
-        if sample.epoch != before.epoch or sample.seq != before.seq + 1:
-            yield begin.epoch, begin.seq, before.seq
-            begin = sample
-        before = sample
-    yield begin.epoch, begin.seq, before.seq
