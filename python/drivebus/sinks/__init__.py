@@ -9,14 +9,25 @@ from typing import TYPE_CHECKING
 from drivebus.lazy_names import later
 
 if TYPE_CHECKING:
+    from drivebus.sinks.mqtt import Answer, Commander, Mqtt
+    from drivebus.sinks.mqtt_commands import Command
+    from drivebus.sinks.mqtt_drives import MqttDrive, MqttValue
+    from drivebus.sinks.mqtt_settings import MqttSettings
     from drivebus.sinks.picture import DrivePicture, GatewayPicture, LinePicture, Picture
     from drivebus.sinks.postgres import Postgres, PostgresSettings
     from drivebus.sinks.prometheus import Prometheus
 
 __all__ = [
+    "Answer",
+    "Command",
+    "Commander",
     "DrivePicture",
     "GatewayPicture",
     "LinePicture",
+    "Mqtt",
+    "MqttDrive",
+    "MqttSettings",
+    "MqttValue",
     "Picture",
     "Postgres",
     "PostgresSettings",
@@ -27,6 +38,10 @@ if not TYPE_CHECKING:
     __getattr__ = later(
         __name__,
         {
+            "mqtt": ("Answer", "Commander", "Mqtt"),
+            "mqtt_commands": ("Command",),
+            "mqtt_drives": ("MqttDrive", "MqttValue"),
+            "mqtt_settings": ("MqttSettings",),
             "picture": ("DrivePicture", "GatewayPicture", "LinePicture", "Picture"),
             "postgres": ("Postgres", "PostgresSettings"),
             "prometheus": ("Prometheus",),
