@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from drivebus.site.config import FILE, Site
     from drivebus.site.entries import SiteDrive, SiteLine
     from drivebus.site.known_families import families_on, forget, known_family, remember
+    from drivebus.site.mqtt import SiteMqtt, SiteMqttAllow
     from drivebus.site.polls import SitePoll, SiteSpool
     from drivebus.site.share import SiteAllow, SiteGateway, SiteShare
     from drivebus.site.sinks import SitePostgres, SitePrometheus
@@ -20,6 +21,8 @@ __all__ = [
     "SiteDrive",
     "SiteGateway",
     "SiteLine",
+    "SiteMqtt",
+    "SiteMqttAllow",
     "SitePoll",
     "SitePostgres",
     "SitePrometheus",
@@ -39,6 +42,7 @@ if not TYPE_CHECKING:
             "config": ("FILE", "Site"),
             "entries": ("SiteDrive", "SiteLine"),
             "known_families": ("families_on", "forget", "known_family", "remember"),
+            "mqtt": ("SiteMqtt", "SiteMqttAllow"),
             "polls": ("SitePoll", "SiteSpool"),
             "share": ("SiteAllow", "SiteShare", "SiteGateway"),
             "sinks": ("SitePostgres", "SitePrometheus"),

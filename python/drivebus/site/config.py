@@ -29,6 +29,7 @@ from drivebus.advice import Text
 from drivebus.errors import BadArgument
 from drivebus.line.addresses import Addresses
 from drivebus.site.entries import SiteDrive, SiteLine
+from drivebus.site.mqtt import SiteMqtt, mqtt_of
 from drivebus.site.polls import SitePoll, SiteSpool, polls_of, spool_of
 from drivebus.site.reading import Reading, Wrong, flag, one_of, quoted, text, texts, whole
 from drivebus.site.share import SiteShare, share_of
@@ -40,7 +41,7 @@ FILE = "drivebus.toml"
 """What the file is called."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
-_SECTIONS = ("lines", "drives", "groups", "share", "poll", "spool", "prometheus", "postgres")
+_SECTIONS = ("lines", "drives", "groups", "share", "poll", "spool", "prometheus", "postgres", "mqtt")
 _LARGEST = 1_000_000
 """Bytes that such a file may have."""
 
@@ -59,6 +60,7 @@ class Site:
         spool: Where it keeps what they say until others have it.
         prometheus: Where Prometheus finds how they are.
         postgres: Where their samples go.
+        mqtt: The broker that is told of them, and by which they may be told something.
     """
 
     path: Path
@@ -70,6 +72,7 @@ class Site:
     spool: SiteSpool | None = None
     prometheus: SitePrometheus | None = None
     postgres: SitePostgres | None = None
+    mqtt: SiteMqtt | None = None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Site:
@@ -126,8 +129,9 @@ class _Reader:
         share = share_of(self._file, lines, drives, groups)
         polls, spool = polls_of(self._file, drives, groups), spool_of(self._file)
         prometheus, postgres = prometheus_of(self._file), postgres_of(self._file)
+        mqtt = mqtt_of(self._file, drives, groups)
         self._file.finish()
-        return Site(self._file.path, lines, drives, groups, share, polls, spool, prometheus, postgres)
+        return Site(self._file.path, lines, drives, groups, share, polls, spool, prometheus, postgres, mqtt)
 
     def _tables(self, section: str, read: Callable[[str, dict[str, Any]], Any]) -> Iterator[tuple[str, Any]]:
         """Each table in *section*, as *read* makes it."""

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from itertools import takewhile
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 from drivebus import checks
 from drivebus.errors import BadArgument
@@ -22,6 +22,7 @@ __all__ = [
     "Reading",
     "Wrong",
     "address",
+    "dead_man_of",
     "flag",
     "listed",
     "number",
@@ -207,6 +208,20 @@ def address(value: Any) -> str:
     if not isinstance(value, str) or not re.fullmatch(r".+:\d{1,5}", value) or int(value.rpartition(":")[2]) > 0xFFFF:
         raise Wrong('not an address and a port, such as "127.0.0.1:1502"')
     return value
+
+
+def dead_man_of(low: float, high: float) -> Callable[[Any], float | Literal["off"]]:
+    """Seconds in this range after which the motor of who is gone is halted, or `"off"`, which one has to type."""
+
+    def read(value: Any) -> float | Literal["off"]:
+        if value == "off":
+            return "off"
+        try:
+            return number(low, high)(value)
+        except Wrong:
+            raise Wrong(f'neither "off" nor seconds from {low:g} to {high:g}') from None
+
+    return read
 
 
 def texts(value: Any) -> dict[str, str]:

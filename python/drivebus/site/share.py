@@ -25,7 +25,20 @@ from typing import Any, Literal
 
 from drivebus import checks
 from drivebus.site.entries import SiteDrive, SiteLine, drives_named
-from drivebus.site.reading import Key, Reading, Wrong, address, flag, listed, number, one_of, quoted, text, whole
+from drivebus.site.reading import (
+    Key,
+    Reading,
+    Wrong,
+    address,
+    dead_man_of,
+    flag,
+    listed,
+    number,
+    one_of,
+    quoted,
+    text,
+    whole,
+)
 
 __all__ = ["SiteAllow", "SiteGateway", "SiteShare", "share_of"]
 
@@ -152,7 +165,7 @@ class _Gateways:
         file = self.file
         name = file.value(where, table, "line", text, needed=len(self.lines) != 1)
         within = file.value(where, table, "answer_within", number(*_WITHIN))
-        dead_man = file.value(where, table, "dead_man", _dead_man)
+        dead_man = file.value(where, table, "dead_man", dead_man_of(*_DEAD_MAN))
         line = self.lines.get(name) if name else next(iter(self.lines.values()), None)
         if name is not None and line is None:
             hint = checks.closest(name, self.lines)
@@ -192,15 +205,6 @@ def _absolute(value: Any) -> str:
     if not text(value).startswith("/"):
         raise Wrong('not a path that begins with "/", such as "/run/drivebus/plc"')
     return text(value)
-
-
-def _dead_man(value: Any) -> float | Literal["off"]:
-    if value == "off":
-        return "off"
-    try:
-        return number(*_DEAD_MAN)(value)
-    except Wrong:
-        raise Wrong(f'neither "off" nor seconds from {_DEAD_MAN[0]:g} to {_DEAD_MAN[1]:g}') from None
 
 
 def _network(value: Any) -> str:
