@@ -5,7 +5,8 @@ Nothing is opened, and nothing is sent.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.util import find_spec
 
 from drivebus import checks
@@ -14,13 +15,15 @@ from drivebus.operations import network_rights
 from drivebus.operations.last_will import WAYS
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
-from drivebus.sinks import Postgres, PostgresSettings
-from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SitePoll, SitePostgres
+from drivebus.sinks import Mqtt, MqttSettings, Postgres, PostgresSettings
+from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SiteMqtt, SitePoll, SitePostgres
 
-__all__ = ["check", "hours_of", "settings_of"]
+__all__ = ["check", "evidence_of", "hours_of", "mqtt_settings_of", "settings_of"]
 
 _BYTES, _BYTES_A_VALUE = 34, 4
 """Of a sample in the spool, as it was measured."""
+_SIGNS = 4
+"""Signs of life that a broker is asked for in the time of the dead man."""
 
 
 def check(site: Site) -> None:
@@ -34,6 +37,7 @@ def check(site: Site) -> None:
     if site.prometheus is not None and find_spec("prometheus_client") is None:
         wrong.add((site.prometheus.at, "this needs prometheus-client: pip install 'drivebus[prometheus]'"))
     wrong |= set(_of_postgres(site))
+    wrong |= set(_of_mqtt(site.mqtt)) if site.mqtt is not None else set()
     if wrong:
         count = "one mistake" if len(wrong) == 1 else f"{len(wrong)} mistakes"
         told = [f"{site.path}:{line}: {reason}" for line, reason in sorted(wrong)]
@@ -54,6 +58,23 @@ def settings_of(told: SitePostgres) -> PostgresSettings:
     return PostgresSettings(told.conninfo, told.gateway, told.schema, told.password_file)
 
 
+def mqtt_settings_of(told: SiteMqtt) -> MqttSettings:
+    """Where the broker is, as the sink takes it."""
+    beat = told.dead_man / _SIGNS if isinstance(told.dead_man, float) else math.inf
+    return MqttSettings(
+        told.host,
+        told.port,
+        told.gateway,
+        told.tls,
+        told.topic,
+        told.username,
+        told.password_file,
+        told.ca_file,
+        told.home_assistant,
+        beat,
+    )
+
+
 def hours_of(site: Site) -> float | None:
     """How many hours of samples the spool holds, if each is kept; None where nothing is polled."""
     if not site.polls or site.spool is None:
@@ -71,11 +92,27 @@ def _of_gateway(gateway: SiteGateway) -> Iterator[tuple[int, str]]:
     for allow in gateway.allow:
         yield from _of_rule(allow, moved)
     if moved and gateway.dead_man is None:
-        yield (
-            gateway.at,
-            f"clients may move {moved[0]}, and nothing says what becomes of it when they are gone: say dead_man, "
-            'seconds after which it is halted, or "off" if it shall run on',
-        )
+        yield gateway.at, _without_dead_man(moved)
+
+
+def _without_dead_man(moved: list[str]) -> str:
+    return (
+        f"clients may move {moved[0]}, and nothing says what becomes of it when they are gone: say dead_man, "
+        'seconds after which it is halted, or "off" if it shall run on'
+    )
+
+
+def _of_mqtt(told: SiteMqtt) -> Iterator[tuple[int, str]]:
+    try:
+        Mqtt.check(mqtt_settings_of(told))
+    except NotAllowed as error:
+        yield told.at, str(error)
+    moved: list[str] = []
+    for allow in told.allow:
+        for drive in allow.drives:
+            yield from _of_drive(drive, [("commands", name) for name in allow.commands], allow.lines, moved)
+    if moved and told.dead_man is None:
+        yield told.at, _without_dead_man(moved)
 
 
 def _of_rule(allow: SiteAllow, moved: list[str]) -> Iterator[tuple[int, str]]:
@@ -94,7 +131,8 @@ def _of_rule(allow: SiteAllow, moved: list[str]) -> Iterator[tuple[int, str]]:
             yield allow.lines["write"], str(error)
     for drive in allow.drives:
         if allow.write or allow.commands:
-            yield from _of_drive(allow, drive, moved)
+            named = [*(("write", name) for name in allow.write), *(("commands", name) for name in allow.commands)]
+            yield from _of_drive(drive, named, allow.lines, moved)
 
 
 def _of_poll(poll: SitePoll) -> Iterator[tuple[int, str]]:
@@ -116,6 +154,15 @@ def _of_poll(poll: SitePoll) -> Iterator[tuple[int, str]]:
                     yield poll.lines["band"], f'"{drive.name}" is not asked for {name}, which has a band{hint}'
 
 
+def evidence_of(drive: SiteDrive) -> Evidence:
+    """What is known of the family of *drive*, as the file trusts it.
+
+    Raises:
+        NotAllowed: There is no such family, or no such variant of it.
+    """
+    return Evidence(_profile_of(drive), drive.unit, drive.unverified)
+
+
 def _profile_of(drive: SiteDrive) -> Profile:
     profile = Profile.find(drive.profile or "")
     return profile.with_variants(drive.variants) if drive.variants else profile
@@ -126,13 +173,16 @@ def _known(drive: SiteDrive, who: str) -> Evidence | str:
     if drive.profile is None:
         return f'"{drive.name}" has no profile, and {who} needs one: say it in [drives.{drive.name}]'
     try:
-        return Evidence(_profile_of(drive), drive.unit, drive.unverified)
+        return evidence_of(drive)
     except NotAllowed as error:
         return f'"{drive.name}": {error}'
 
 
-def _of_drive(allow: SiteAllow, drive: SiteDrive, moved: list[str]) -> Iterator[tuple[int, str]]:
-    at = allow.lines["drives"]
+def _of_drive(
+    drive: SiteDrive, named: Iterable[tuple[str, str | int]], lines: Mapping[str, int], moved: list[str]
+) -> Iterator[tuple[int, str]]:
+    """What is wrong in letting somebody write to *drive* what is *named* under keys that stand in *lines*."""
+    at = lines["drives"]
     evidence = _known(drive, "who writes to it")
     if isinstance(evidence, str):
         yield at, evidence
@@ -141,14 +191,11 @@ def _of_drive(allow: SiteAllow, drive: SiteDrive, moved: list[str]) -> Iterator[
         yield at, f'"{drive.name}" is read_only'
         return
     moves = False
-    named: list[tuple[str, list[str | int], list[str]]] = [("write", [name], []) for name in allow.write] + [
-        ("commands", [], [name]) for name in allow.commands
-    ]
-    for key, registers, commands in named:
+    for key, name in named:
         try:
-            writes = network_rights.of_drive(evidence, registers, commands)
+            writes = network_rights.of_drive(evidence, *(([name], []) if key == "write" else ([], [name])))
         except NotAllowed as error:
-            yield allow.lines[key], str(error)
+            yield lines[key], str(error)
         else:
             moves = moves or network_rights.moves(writes)
     if moves:

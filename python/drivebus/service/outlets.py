@@ -13,6 +13,7 @@ from drivebus.errors import DrivebusError
 from drivebus.service.events import Events
 from drivebus.service.mistakes import settings_of
 from drivebus.service.orders import Orders
+from drivebus.service.over_mqtt import OverMqtt
 from drivebus.sinks import Picture, Postgres, Prometheus
 from drivebus.site import Site
 from drivebus.spool import Spool
@@ -62,6 +63,8 @@ def outlets_of(plant: Plant) -> dict[str, Outlet]:
     site, found = plant.site, dict[str, Outlet]()
     if site.postgres is not None and plant.spool is not None:
         found["postgres"] = _Delivering(Postgres(plant.spool, settings_of(site.postgres), plant.tell))
+    if site.mqtt is not None:
+        found["mqtt"] = OverMqtt(site, site.mqtt, plant.look, plant.spool, plant.events, plant.orders, plant.tell)
     if site.prometheus is not None:
         address = site.prometheus.address
         found["prometheus"] = Listening(
