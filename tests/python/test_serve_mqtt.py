@@ -265,8 +265,9 @@ def told_of(folder: Path, plant: str, said: str) -> None:
 
 def test_without_the_library_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "paho.mqtt.client", None)
-    monkeypatch.delitem(sys.modules, "drivebus.sinks.mqtt_link", raising=False)
-    monkeypatch.delattr("drivebus.sinks.mqtt_link", raising=False)
+    for module in ("mqtt_client", "mqtt_link"):
+        monkeypatch.delitem(sys.modules, f"drivebus.sinks.{module}", raising=False)
+        monkeypatch.delattr(f"drivebus.sinks.{module}", raising=False)
     told_of(tmp_path, PLANT, "pip install 'drivebus[mqtt]'")
 
 

@@ -45,6 +45,9 @@ class Destination(Protocol):
     def put(self, samples: Sequence[Spooled]) -> None:
         """Takes *samples*, all or none; they are kept when this returns."""
 
+    def check(self) -> None:
+        """Raises why it takes nothing any more, where that is known without asking."""
+
     def interrupt(self) -> None:
         """Whatever `open` or `put` waits for is over, from now on. Any thread."""
 
@@ -132,6 +135,7 @@ class Delivery:
         self._why = ""
         told, due = -1, 0.0
         while not self._closing.is_set():
+            self._destination.check()
             if lanes.contiguous != told:
                 told = lanes.contiguous
                 reader.reached(told)

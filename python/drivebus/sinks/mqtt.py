@@ -10,6 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drivebus import checks
@@ -115,7 +116,7 @@ class Mqtt:
         self._wake = threading.Event()
         self._closing = threading.Event()
         farewell = Message(self._topics.availability, OFFLINE, keeps=True)
-        self._link = _paho().Link(settings, farewell, self._hear, tell, self._wake.set, clock)
+        self._link = _paho("mqtt_link").Link(settings, farewell, self._hear, tell, self._wake.set, clock)
         self._delivery: Delivery | None = None
         if spool is not None:
             self._delivery = Delivery(spool, SINK, History(spool, self._link, self._topics), tell)
@@ -128,7 +129,7 @@ class Mqtt:
         Raises:
             NotAllowed: They cannot, or paho-mqtt is not installed.
         """
-        _paho().checked(settings)
+        _paho("mqtt_client").checked(settings)
 
     def start(self) -> None:
         """Begins to connect, and to speak."""
@@ -280,10 +281,9 @@ def _shown(drives: Sequence[MqttDrive], settings: MqttSettings) -> dict[str, Mes
     }
 
 
-def _paho() -> ModuleType:
-    """What needs paho-mqtt."""
+def _paho(name: str) -> ModuleType:
+    """The module called *name*, which needs paho-mqtt."""
     try:
-        from drivebus.sinks import mqtt_link
+        return import_module(f"drivebus.sinks.{name}")
     except ImportError:
         raise NotAllowed("MQTT needs paho-mqtt: pip install 'drivebus[mqtt]'") from None
-    return mqtt_link

@@ -6,13 +6,14 @@ A broker cannot be asked what it has. So this remembers it, and after a start th
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from drivebus.sinks.intervals import Intervals, runs
+from drivebus.errors import NotAllowed
+from drivebus.sinks.intervals import Intervals
 from drivebus.sinks.mqtt_messages import Message, batches, event, packed
 from drivebus.sinks.mqtt_topics import Topics
+from drivebus.sinks.reached import Reached
 from drivebus.spool import Spool, Spooled
 
 if TYPE_CHECKING:
@@ -37,32 +38,24 @@ class History:
 
     def __init__(self, spool: Spool, link: Link, topics: Topics) -> None:
         self.name = link.name
-        self._spool = spool
         self._link = link
         self._topics = topics
-        # A spool that lost its end gives numbers again, and these are not those that were delivered.
-        self._newest = spool.last
-        self._inside: dict[str, Intervals] | None = None
+        self._reached = Reached(spool, SINK)
 
     def open(self) -> Mapping[str, Intervals]:
         """Waits for the connection, and tells what was delivered."""
         self._link.wait()
-        if self._inside is None:
-            with closing(self._spool.reader(SINK)) as reader:
-                reached = min(reader.position(), self._newest)
-                self._inside = {
-                    each.epoch: Intervals([(each.first, min(each.last, reached))])
-                    for each in reader.stretches()
-                    if each.first <= reached
-                }
-        return self._inside
+        return self._reached.open()
 
     def put(self, samples: Sequence[Spooled]) -> None:
         """Takes *samples*: when this returns, the broker has them."""
-        assert self._inside is not None
         self._link.put(list(self._messages(samples)))
-        for epoch, first, last in runs(samples):
-            self._inside.setdefault(epoch, Intervals()).add(first, last)
+        self._reached.take(samples)
+
+    def check(self) -> None:
+        """Raises why there is no connection."""
+        if self._link.why:
+            raise NotAllowed(self._link.why)
 
     def interrupt(self) -> None:
         """Whatever is waited for is over, from now on."""

@@ -6,8 +6,6 @@ anew, and the session is a clean one. At most a window of messages is under way.
 
 from __future__ import annotations
 
-import socket
-import ssl
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -15,18 +13,18 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 import paho.mqtt.client as paho
-from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
+from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 from paho.mqtt.subscribeoptions import SubscribeOptions
 
 from drivebus.errors import NotAllowed
+from drivebus.sinks.mqtt_client import CONNECTS, checked, cut, new_client, reason_of
 from drivebus.sinks.mqtt_messages import Message
 from drivebus.sinks.mqtt_settings import MqttSettings
-from drivebus.sinks.password_file import password_in
 
-__all__ = ["Incoming", "Link", "checked"]
+__all__ = ["Incoming", "Link"]
 
 _WINDOW = 100
 """Messages under way that the broker has not acknowledged."""
@@ -34,8 +32,6 @@ _KEEPALIVE = 10
 """Seconds. A broker that hears nothing for half as long again says that this gateway is gone."""
 _SILENCE = 30.0
 """Seconds that a broker may take to acknowledge the next message."""
-_CONNECTS = 10.0
-"""Seconds for a connection."""
 _FIRST_PAUSE, _LONGEST_PAUSE = 1.0, 15.0
 """Seconds between two attempts."""
 _LARGEST = 65_536
@@ -64,25 +60,6 @@ class Incoming(NamedTuple):
     expiry: float | None
     answer_to: str
     known_by: bytes | None
-
-
-def checked(settings: MqttSettings) -> ssl.SSLContext | None:
-    """What *settings* mean for TLS; None: it is not used. Nothing is connected.
-
-    Raises:
-        NotAllowed: The password or the certificates cannot be read.
-    """
-    if settings.password_file is not None:
-        password_in(settings.password_file)
-    if not settings.tls:
-        return None
-    try:
-        # It verifies the chain and the name of the host.
-        context = ssl.create_default_context(cafile=settings.ca_file)
-    except OSError as error:
-        raise NotAllowed(f"the certificates in {settings.ca_file} cannot be read: {_why(error)}") from None
-    context.sslsocket_class = _Wire
-    return context
 
 
 class Link:
@@ -271,13 +248,13 @@ class Link:
         except NotAllowed as error:
             return str(error)
         except (OSError, ValueError) as error:
-            return _why(error)
+            return reason_of(error)
         with self._lock:
             self._client = client
             self._ending = ""
         client.loop_start()
-        if not self._ended.wait(_CONNECTS) and self.why:
-            self._ending = f"it does not answer for {_CONNECTS:g} s"
+        if not self._ended.wait(CONNECTS) and self.why:
+            self._ending = f"it does not answer for {CONNECTS:g} s"
         else:
             self._ended.wait()
         if self._closing.is_set():
@@ -285,26 +262,15 @@ class Link:
             client.disconnect(reasoncode=ReasonCode(PacketTypes.DISCONNECT, identifier=4))
             self._ended.clear()
             self._ended.wait(_GRACE)
-        _cut(client)
+        cut(client)
         client.loop_stop()
         return self._ending
 
     def _new_client(self) -> paho.Client:
         """A new one each time: the one before still has messages of its own that it would send again."""
-        settings, context = self._settings, checked(self._settings)
-        client = _Client(
-            self._loop_ended,
-            client_id=f"drivebus-{settings.topics.node}",
-            protocol=paho.MQTTv5,
-            reconnect_on_failure=False,
-        )
-        client.connect_timeout = _CONNECTS
+        settings = self._settings
+        client = new_client(settings, self._loop_ended, f"drivebus-{settings.topics.node}", paho.MQTTv5)
         client.max_inflight_messages_set(_WINDOW)
-        if context is not None:
-            client.tls_set_context(context)
-        if settings.username:
-            password = "" if settings.password_file is None else password_in(settings.password_file)
-            client.username_pw_set(settings.username, password)
         client.will_set(self._will.topic, self._will.payload, qos=1, retain=self._will.keeps)
         client.on_connect = self._on_connect
         client.on_disconnect = self._on_disconnect
@@ -378,65 +344,9 @@ class Link:
             )
 
 
-class _Wire(ssl.SSLSocket):
-    """A socket that is closed when the other side is not who it should be: the client leaves it open."""
-
-    def do_handshake(self, block: bool = False) -> None:
-        """Learns who the other side is.
-
-        Raises:
-            OSError: It is not who it should be, or does not say.
-        """
-        try:
-            super().do_handshake(block)
-        except BaseException:
-            self.close()
-            raise
-
-
-class _Client(paho.Client):
-    """A client that says when nobody serves it any more, whatever ended that.
-
-    Args:
-        ended: Told why, in words; empty where the client itself has said it.
-    """
-
-    def __init__(self, ended: Callable[[str], None], **settings: Any) -> None:
-        super().__init__(CallbackAPIVersion.VERSION2, **settings)
-        self._say_ended = ended
-
-    def loop_forever(self, timeout: float = 1.0, retry_first_connection: bool = False) -> MQTTErrorCode:
-        """Serves it; called in the thread that `loop_start` makes."""
-        why = ""
-        try:
-            return super().loop_forever(timeout, retry_first_connection)
-        except Exception as error:  # of what a broker can send, not all is foreseen
-            why = f"what it sent could not be read: {error}"
-            return MQTTErrorCode.MQTT_ERR_PROTOCOL
-        finally:
-            self._say_ended(why)
-
-
-def _cut(client: paho.Client) -> None:
-    """Whatever the client waits for is over."""
-    wire = client.socket()
-    if isinstance(wire, socket.socket):
-        with suppress(OSError):
-            # Of the socket below: the thread that reads goes on using what encrypts.
-            socket.socket.shutdown(wire, socket.SHUT_RDWR)
-
-
 def _properties(of: int) -> Properties:
     made: Callable[[int], Properties] = Properties  # the library has no types for it
     return made(of)
-
-
-def _why(error: Exception) -> str:
-    if isinstance(error, ssl.SSLCertVerificationError):
-        return f"its certificate is not trusted: {error.verify_message}"
-    if isinstance(error, OSError):
-        return error.strerror or str(error) or type(error).__name__
-    return str(error)
 
 
 def _in_words(code: ReasonCode) -> str:

@@ -82,6 +82,9 @@ class Session:
                 self._is_careful = True
                 raise
 
+    def check(self) -> None:
+        """A server that is gone is noticed by the next samples."""
+
     def interrupt(self) -> None:
         """Whatever waits for the server is over, from now on. Any thread."""
         self._is_over = True

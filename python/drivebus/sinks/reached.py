@@ -1,0 +1,45 @@
+"""What a destination has that cannot be asked: remembered here, and after a start the spool says how far it came."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+
+from drivebus.sinks.intervals import Intervals, runs
+from drivebus.spool import Spool, Spooled
+
+__all__ = ["Reached"]
+
+
+class Reached:
+    """What one sink has of a spool.
+
+    Args:
+        spool: Where samples wait.
+        sink: The name under which the spool knows how far it came.
+    """
+
+    def __init__(self, spool: Spool, sink: str) -> None:
+        self._spool = spool
+        self._sink = sink
+        # A spool that lost its end gives numbers again, and these are not those that were delivered.
+        self._newest = spool.last
+        self._inside: dict[str, Intervals] | None = None
+
+    def open(self) -> Mapping[str, Intervals]:
+        """What it has, by the names of the epochs."""
+        if self._inside is None:
+            with closing(self._spool.reader(self._sink)) as reader:
+                reached = min(reader.position(), self._newest)
+                self._inside = {
+                    each.epoch: Intervals([(each.first, min(each.last, reached))])
+                    for each in reader.stretches()
+                    if each.first <= reached
+                }
+        return self._inside
+
+    def take(self, samples: Sequence[Spooled]) -> None:
+        """It has *samples*, too."""
+        assert self._inside is not None
+        for epoch, first, last in runs(samples):
+            self._inside.setdefault(epoch, Intervals()).add(first, last)
