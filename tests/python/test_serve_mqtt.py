@@ -283,4 +283,4 @@ def test_the_way_is_encrypted_unless_the_file_says_otherwise(tmp_path: Path) -> 
         file.write_text(f'[spool]\n[mqtt]\nhost = "{host}"\ngateway = "g"\n{more}')
         told = Site.load(file).mqtt
         assert told is not None
-        assert (told.tls, told.port) == expected
+        assert (told.broker.tls, told.broker.port) == expected

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.util import find_spec
+from typing import Any
 
 from drivebus import checks
 from drivebus.errors import BadArgument, NotAllowed
@@ -15,13 +16,25 @@ from drivebus.operations import network_rights
 from drivebus.operations.last_will import WAYS
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
-from drivebus.sinks import Mqtt, MqttSettings, Postgres, PostgresSettings
-from drivebus.site import Site, SiteAllow, SiteDrive, SiteGateway, SiteMqtt, SitePoll, SitePostgres
+from drivebus.sinks import Mqtt, MqttSettings, Postgres, PostgresSettings, Sparkplug, SparkplugSettings
+from drivebus.site import (
+    Site,
+    SiteAllow,
+    SiteBroker,
+    SiteDrive,
+    SiteGateway,
+    SiteMqtt,
+    SitePoll,
+    SitePostgres,
+    SiteSparkplug,
+)
 
-__all__ = ["check", "evidence_of", "hours_of", "mqtt_settings_of", "settings_of"]
+__all__ = ["check", "evidence_of", "hours_of", "mqtt_settings_of", "settings_of", "sparkplug_settings_of"]
 
 _BYTES, _BYTES_A_VALUE = 34, 4
 """Of a sample in the spool, as it was measured."""
+_TELLING = 2
+"""Values beside those that are named: state and fault."""
 _SIGNS = 4
 """Signs of life that a broker is asked for in the time of the dead man."""
 
@@ -38,6 +51,7 @@ def check(site: Site) -> None:
         wrong.add((site.prometheus.at, "this needs prometheus-client: pip install 'drivebus[prometheus]'"))
     wrong |= set(_of_postgres(site))
     wrong |= set(_of_mqtt(site.mqtt)) if site.mqtt is not None else set()
+    wrong |= set(_of_sparkplug(site.sparkplug)) if site.sparkplug is not None else set()
     if wrong:
         count = "one mistake" if len(wrong) == 1 else f"{len(wrong)} mistakes"
         told = [f"{site.path}:{line}: {reason}" for line, reason in sorted(wrong)]
@@ -61,17 +75,25 @@ def settings_of(told: SitePostgres) -> PostgresSettings:
 def mqtt_settings_of(told: SiteMqtt) -> MqttSettings:
     """Where the broker is, as the sink takes it."""
     beat = told.dead_man / _SIGNS if isinstance(told.dead_man, float) else math.inf
+    return _at(told.broker, told.gateway, prefix=told.topic, home_assistant=told.home_assistant, beat=beat)
+
+
+def sparkplug_settings_of(told: SiteSparkplug) -> SparkplugSettings:
+    """Which node this is, and where, as the sink takes it."""
+    return SparkplugSettings(_at(told.broker, told.node), told.group, told.node, told.primary_host)
+
+
+def _at(broker: SiteBroker, name: str, **more: Any) -> MqttSettings:
+    """Where the *broker* is, for whom it knows by that *name*."""
     return MqttSettings(
-        told.host,
-        told.port,
-        told.gateway,
-        told.tls,
-        told.topic,
-        told.username,
-        told.password_file,
-        told.ca_file,
-        told.home_assistant,
-        beat,
+        broker.host,
+        broker.port,
+        name,
+        tls=broker.tls,
+        username=broker.username,
+        password_file=broker.password_file,
+        ca_file=broker.ca_file,
+        **more,
     )
 
 
@@ -82,7 +104,7 @@ def hours_of(site: Site) -> float | None:
     each_second = 0.0
     for poll in site.polls:
         for drive in poll.drives:
-            values = len(poll.registers) or len(_profile_of(drive).monitor_names())
+            values = (len(poll.registers) or len(_profile_of(drive).monitor_names())) + _TELLING
             each_second += (_BYTES + _BYTES_A_VALUE * values) / poll.interval
     return site.spool.size / each_second / 3600 if each_second else None
 
@@ -100,6 +122,13 @@ def _without_dead_man(moved: list[str]) -> str:
         f"clients may move {moved[0]}, and nothing says what becomes of it when they are gone: say dead_man, "
         'seconds after which it is halted, or "off" if it shall run on'
     )
+
+
+def _of_sparkplug(told: SiteSparkplug) -> Iterator[tuple[int, str]]:
+    try:
+        Sparkplug.check(sparkplug_settings_of(told))
+    except NotAllowed as error:
+        yield told.at, str(error)
 
 
 def _of_mqtt(told: SiteMqtt) -> Iterator[tuple[int, str]]:

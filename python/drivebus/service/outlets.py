@@ -11,10 +11,10 @@ from typing import Any, Protocol
 
 from drivebus.errors import DrivebusError
 from drivebus.service.events import Events
-from drivebus.service.mistakes import settings_of
+from drivebus.service.mistakes import settings_of, sparkplug_settings_of
 from drivebus.service.orders import Orders
 from drivebus.service.over_mqtt import OverMqtt
-from drivebus.sinks import Picture, Postgres, Prometheus
+from drivebus.sinks import Picture, Postgres, Prometheus, Sparkplug
 from drivebus.site import Site
 from drivebus.spool import Spool
 
@@ -65,6 +65,9 @@ def outlets_of(plant: Plant) -> dict[str, Outlet]:
         found["postgres"] = _Delivering(Postgres(plant.spool, settings_of(site.postgres), plant.tell))
     if site.mqtt is not None:
         found["mqtt"] = OverMqtt(site, site.mqtt, plant.look, plant.spool, plant.events, plant.orders, plant.tell)
+    if site.sparkplug is not None and plant.spool is not None:
+        node = Sparkplug(plant.spool, sparkplug_settings_of(site.sparkplug), plant.look, plant.tell)
+        found["sparkplug"] = _Delivering(node)
     if site.prometheus is not None:
         address = site.prometheus.address
         found["prometheus"] = Listening(

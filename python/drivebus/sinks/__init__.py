@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from drivebus.sinks.picture import DrivePicture, GatewayPicture, LinePicture, Picture
     from drivebus.sinks.postgres import Postgres, PostgresSettings
     from drivebus.sinks.prometheus import Prometheus
+    from drivebus.sinks.sparkplug import Sparkplug
+    from drivebus.sinks.sparkplug_settings import SparkplugSettings
 
 __all__ = [
     "Answer",
@@ -32,6 +34,8 @@ __all__ = [
     "Postgres",
     "PostgresSettings",
     "Prometheus",
+    "Sparkplug",
+    "SparkplugSettings",
 ]
 
 if not TYPE_CHECKING:
@@ -42,6 +46,8 @@ if not TYPE_CHECKING:
             "mqtt_commands": ("Command",),
             "mqtt_drives": ("MqttDrive", "MqttValue"),
             "mqtt_settings": ("MqttSettings",),
+            "sparkplug": ("Sparkplug",),
+            "sparkplug_settings": ("SparkplugSettings",),
             "picture": ("DrivePicture", "GatewayPicture", "LinePicture", "Picture"),
             "postgres": ("Postgres", "PostgresSettings"),
             "prometheus": ("Prometheus",),

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from drivebus.lazy_names import later
 
 if TYPE_CHECKING:
+    from drivebus.site.broker import SiteBroker
     from drivebus.site.config import FILE, Site
     from drivebus.site.entries import SiteDrive, SiteLine
     from drivebus.site.known_families import families_on, forget, known_family, remember
@@ -12,12 +13,14 @@ if TYPE_CHECKING:
     from drivebus.site.polls import SitePoll, SiteSpool
     from drivebus.site.share import SiteAllow, SiteGateway, SiteShare
     from drivebus.site.sinks import SitePostgres, SitePrometheus
+    from drivebus.site.sparkplug import SiteSparkplug
     from drivebus.site.state_folder import state_file
 
 __all__ = [
     "FILE",
     "Site",
     "SiteAllow",
+    "SiteBroker",
     "SiteDrive",
     "SiteGateway",
     "SiteLine",
@@ -27,6 +30,7 @@ __all__ = [
     "SitePostgres",
     "SitePrometheus",
     "SiteShare",
+    "SiteSparkplug",
     "SiteSpool",
     "families_on",
     "forget",
@@ -42,7 +46,9 @@ if not TYPE_CHECKING:
             "config": ("FILE", "Site"),
             "entries": ("SiteDrive", "SiteLine"),
             "known_families": ("families_on", "forget", "known_family", "remember"),
+            "broker": ("SiteBroker",),
             "mqtt": ("SiteMqtt", "SiteMqttAllow"),
+            "sparkplug": ("SiteSparkplug",),
             "polls": ("SitePoll", "SiteSpool"),
             "share": ("SiteAllow", "SiteShare", "SiteGateway"),
             "sinks": ("SitePostgres", "SitePrometheus"),

@@ -34,6 +34,7 @@ from drivebus.site.polls import SitePoll, SiteSpool, polls_of, spool_of
 from drivebus.site.reading import Reading, Wrong, flag, one_of, quoted, text, texts, whole
 from drivebus.site.share import SiteShare, share_of
 from drivebus.site.sinks import SitePostgres, SitePrometheus, postgres_of, prometheus_of
+from drivebus.site.sparkplug import SiteSparkplug, sparkplug_of
 
 __all__ = ["FILE", "Site"]
 
@@ -41,7 +42,7 @@ FILE = "drivebus.toml"
 """What the file is called."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
-_SECTIONS = ("lines", "drives", "groups", "share", "poll", "spool", "prometheus", "postgres", "mqtt")
+_SECTIONS = ("lines", "drives", "groups", "share", "poll", "spool", "prometheus", "postgres", "mqtt", "sparkplug")
 _LARGEST = 1_000_000
 """Bytes that such a file may have."""
 
@@ -61,6 +62,7 @@ class Site:
         prometheus: Where Prometheus finds how they are.
         postgres: Where their samples go.
         mqtt: The broker that is told of them, and by which they may be told something.
+        sparkplug: The edge node of Sparkplug that they are.
     """
 
     path: Path
@@ -73,6 +75,7 @@ class Site:
     prometheus: SitePrometheus | None = None
     postgres: SitePostgres | None = None
     mqtt: SiteMqtt | None = None
+    sparkplug: SiteSparkplug | None = None
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Site:
@@ -129,9 +132,9 @@ class _Reader:
         share = share_of(self._file, lines, drives, groups)
         polls, spool = polls_of(self._file, drives, groups), spool_of(self._file)
         prometheus, postgres = prometheus_of(self._file), postgres_of(self._file)
-        mqtt = mqtt_of(self._file, drives, groups)
+        mqtt, sparkplug = mqtt_of(self._file, drives, groups), sparkplug_of(self._file)
         self._file.finish()
-        return Site(self._file.path, lines, drives, groups, share, polls, spool, prometheus, postgres, mqtt)
+        return Site(self._file.path, lines, drives, groups, share, polls, spool, prometheus, postgres, mqtt, sparkplug)
 
     def _tables(self, section: str, read: Callable[[str, dict[str, Any]], Any]) -> Iterator[tuple[str, Any]]:
         """Each table in *section*, as *read* makes it."""

@@ -17,34 +17,21 @@ Here it is read. What the families of the drives can be told, they know.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal
 
+from drivebus.site.broker import BROKER_KEYS, SiteBroker, broker_of, that
 from drivebus.site.entries import SiteDrive, drives_named
-from drivebus.site.reading import Key, Reading, Wrong, dead_man_of, flag, listed, one_of, text, whole
+from drivebus.site.reading import Key, Reading, dead_man_of, listed, one_of, text
 
 __all__ = ["COMMANDS", "SiteMqtt", "SiteMqttAllow", "mqtt_of"]
 
 COMMANDS = ("run", "setpoint", "reset")
 """What may be allowed. Who may do any of it may stop, too."""
-_PLAIN, _ENCRYPTED = 1883, 8883
 _DEAD_MAN = (1.0, 3600.0)
 """Seconds."""
-_KEYS = (
-    "host",
-    "port",
-    "gateway",
-    "username",
-    "password_file",
-    "ca_file",
-    "tls",
-    "topic",
-    "home_assistant",
-    "dead_man",
-    "allow",
-)
+_KEYS = (*BROKER_KEYS, "gateway", "topic", "home_assistant", "dead_man", "allow")
 
 
 @dataclass(frozen=True)
@@ -67,28 +54,18 @@ class SiteMqtt:
     """The broker.
 
     Attributes:
-        host: Its computer.
-        port: Where it listens there.
+        broker: Where it is, and who this is for it.
         gateway: The name of this gateway in the topics.
-        tls: Whether the way there is encrypted.
         topic: What the topics begin with.
-        username: Who this is for it; empty: nobody.
-        password_file: A file with the password.
-        ca_file: The certificates that are trusted; None: those of the system.
         home_assistant: What topics of Home Assistant's discovery begin with; empty: it is told nothing.
         dead_man: Seconds without the broker after which a motor is halted, `"off"`, or None where it is not said.
         allow: What drives may be told.
         at: In which line of the file its table begins.
     """
 
-    host: str
-    port: int
+    broker: SiteBroker
     gateway: str
-    tls: bool = True
     topic: str = "drivebus"
-    username: str = ""
-    password_file: Path | None = None
-    ca_file: Path | None = None
     home_assistant: str = ""
     dead_man: float | Literal["off"] | None = None
     allow: tuple[SiteMqttAllow, ...] = ()
@@ -113,31 +90,17 @@ def mqtt_of(
         return None
     # Not for who has no such table: a stop waits for all that is loaded.
     from drivebus.sinks.mqtt_topics import why_no_level, why_no_prefix
-    from drivebus.sinks.this_computer import is_loopback
 
     where = ("mqtt",)
-    host = file.value(where, table, "host", text, needed=True)
-    gateway = file.value(where, table, "gateway", _that(why_no_level), needed=True)
-    tls = file.value(where, table, "tls", flag)
-    if tls is None:
-        tls = host is None or not is_loopback(host)
-    port = file.value(where, table, "port", whole(1, 0xFFFF)) or (_ENCRYPTED if tls else _PLAIN)
-    topic = file.value(where, table, "topic", _that(why_no_prefix)) or "drivebus"
-    discovery = file.value(where, table, "home_assistant", _that(why_no_prefix)) or ""
-    username = file.value(where, table, "username", text) or ""
-    password, ca = (_file(file, table, key) for key in ("password_file", "ca_file"))
+    broker = broker_of(file, table, "mqtt")
+    gateway = file.value(where, table, "gateway", that(why_no_level), needed=True)
+    topic = file.value(where, table, "topic", that(why_no_prefix)) or "drivebus"
+    discovery = file.value(where, table, "home_assistant", that(why_no_prefix)) or ""
     dead_man = file.value(where, table, "dead_man", dead_man_of(*_DEAD_MAN))
     allow = [_allow(file, each, there, drives, groups) for there, each in file.tables(table, (*where, "allow"))]
-    if password is not None and not username:
-        file.complain((*where, "password_file"), "a password is one of somebody: say username")
-    if ca is not None and not tls:
-        file.complain((*where, "ca_file"), "certificates are for a way that is encrypted: say tls = true")
-    if "spool" not in file.data:
-        file.complain(where, "samples wait in a spool until the broker has them: say [spool]")
-    if host is None or gateway is None:
+    if broker is None or gateway is None:
         return None
-    at = file.line_of(where)
-    return SiteMqtt(host, port, gateway, tls, topic, username, password, ca, discovery, dead_man, tuple(allow), at)
+    return SiteMqtt(broker, gateway, topic, discovery, dead_man, tuple(allow), file.line_of(where))
 
 
 def _allow(
@@ -154,19 +117,3 @@ def _allow(
     chosen = drives_named(names, drives, groups, file, (*where, "drives"))
     at = {key: file.line_of((*where, key)) for key in keys if key in table} | {"": file.line_of(where)}
     return SiteMqttAllow(chosen, tuple(commands), at)
-
-
-def _file(file: Reading, table: dict[str, Any], key: str) -> Path | None:
-    given = file.value(("mqtt",), table, key, text)
-    return None if given is None else file.path.parent / given
-
-
-def _that(why_not: Callable[[str], str]) -> Callable[[Any], str]:
-    """A text, if there is nothing that *why_not* says against it."""
-
-    def read(value: Any) -> str:
-        if why := why_not(text(value)):
-            raise Wrong(why)
-        return text(value)
-
-    return read
