@@ -215,13 +215,15 @@ def kept_by(folder: Path) -> Iterator[Spooled]:
 
 
 def compared(
-    gateways: Sequence[Gateway], postgres: Server, historian: Historian, listener: Listener
+    gateways: Sequence[Gateway], postgres: Server, historian: Historian, listener: Listener, until: float
 ) -> dict[str, float]:
-    """What the spools have and they have not, and the other way round."""
+    """What the spools have of the time *until* then and they have not, and what they have twice."""
     kept: set[tuple[str, int]] = set()
     values: list[tuple[str, int]] = []
     for gateway in gateways:
         for each in kept_by(gateway.folder):
+            if each.time > until:
+                continue
             kept.add((each.epoch, each.seq))
             if each.values and len(gateways) == 1:
                 values.append((each.layout.drive, int(each.time * 1_000)))
@@ -267,10 +269,12 @@ def measure(number: int, count: int, drives: int, minutes: float, away: float, k
         for each in gateways:
             each.start()
         time.sleep(20.0)
+        # What is kept from here on may not be delivered before the end.
+        until = time.time() - 5.0
         for each in gateways:
             each.end(signal.SIGTERM)
         time.sleep(5.0)
-        figures |= compared(gateways, postgres, historian, listener)
+        figures |= compared(gateways, postgres, historian, listener, until)
     return figures
 
 

@@ -116,7 +116,8 @@ def test_on_a_hostile_line_no_pair_is_wrong(serve: Callable[..., str]) -> None:
             ask_by_pymodbus(tap.master, 150)
         intact, paired, wrong = tap.score(heard)
     assert wrong == 0
-    assert paired >= 0.98 * intact, (intact, paired)
+    # Where a busy machine lets few through, a single one is more than two in a hundred.
+    assert paired >= 0.98 * intact - 1, (intact, paired)
 
 
 @pytest.mark.parametrize("transport", ["pty", "tcp"])
