@@ -24,17 +24,17 @@ mod figures;
 #[cfg(all(unix, feature = "share"))]
 mod halts;
 mod halts_told;
-#[cfg(all(unix, feature = "share"))]
+#[cfg(all(any(unix, windows), feature = "share"))]
 mod host;
 mod listen;
 mod openings;
 mod port;
-#[cfg(any(feature = "tcp", all(unix, feature = "share")))]
+#[cfg(any(feature = "tcp", all(any(unix, windows), feature = "share")))]
 pub(crate) mod programs;
 mod shared;
-#[cfg_attr(not(all(unix, feature = "share")), path = "bus/no_sharing.rs")]
+#[cfg_attr(not(all(any(unix, windows), feature = "share")), path = "bus/no_sharing.rs")]
 mod sharing;
-#[cfg_attr(not(all(unix, feature = "share")), path = "bus/unshared.rs")]
+#[cfg_attr(not(all(any(unix, windows), feature = "share")), path = "bus/unshared.rs")]
 mod through;
 #[cfg_attr(not(all(unix, feature = "share")), path = "bus/no_wills.rs")]
 mod wills;
@@ -284,11 +284,11 @@ impl Bus {
             return Stats::default(); // a thread of the parent's may have held it
         }
         #[cfg_attr(
-            not(any(feature = "tcp", all(unix, feature = "share"))),
+            not(any(feature = "tcp", all(any(unix, windows), feature = "share"))),
             expect(unused_mut, reason = "nobody else is here")
         )]
         let mut stats = self.shared.stats();
-        #[cfg(any(feature = "tcp", all(unix, feature = "share")))]
+        #[cfg(any(feature = "tcp", all(any(unix, windows), feature = "share")))]
         stats.programs.extend(self.port().programs.clients());
         stats
     }

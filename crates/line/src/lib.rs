@@ -38,7 +38,7 @@
 //! | --- | --- |
 //! | `serial` | serial ports of this machine |
 //! | `tcp` | serial servers (`socket://`), Modbus TCP (`tcp://`), and a server for it |
-//! | `share` | ports that programs of one user share, over Unix sockets; elsewhere it changes nothing |
+//! | `share` | ports that programs of one user share |
 //!
 //! # Limits
 //!
@@ -83,7 +83,7 @@ mod options;
 mod owner;
 mod poll;
 mod ports;
-#[cfg(all(unix, feature = "share"))]
+#[cfg(all(any(unix, windows), feature = "share"))]
 mod share;
 mod system;
 mod trace;

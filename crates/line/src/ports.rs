@@ -7,7 +7,7 @@ pub(crate) mod closing;
 #[cfg(feature = "tcp")]
 pub(crate) mod connection;
 pub(crate) mod key;
-#[cfg(all(unix, feature = "share"))]
+#[cfg(all(any(unix, windows), feature = "share"))]
 mod listening;
 #[cfg(feature = "tcp")]
 pub mod mbap;

@@ -1,10 +1,11 @@
-//! One port, several programs of one user or of a group: what they say to each other over a local socket, and where they meet.
+//! One port, several programs of one user or of a group: what they say to each other, and where they meet.
 //!
 //! | room | what is in it |
 //! | --- | --- |
 //! | `key` | which port it is, whatever people call it |
 //! | `folder` | the folders in which programs meet |
-//! | `place` | the socket of a port in one of them, and who may use it |
+//! | `secret`, `proof` | what programs of one user know, and how they show it where the system tells nobody who is who |
+//! | `place` | what stands in a folder for a port, and who may use it |
 //! | `message`, `failure` | what is said |
 //! | `channel` | one connection: messages in and out, with limits |
 //! | `guest` | the side of a program that uses a port through another |
@@ -14,10 +15,14 @@
 
 pub(crate) mod channel;
 pub(crate) mod failure;
+#[cfg_attr(not(unix), path = "share/profile_folder.rs")]
 pub(crate) mod folder;
 pub(crate) mod guest;
 pub(crate) mod message;
 pub(crate) mod place;
+pub(crate) mod proof;
+pub(crate) mod secret;
+#[cfg(unix)]
 pub(crate) mod will;
 
 use std::time::Duration;

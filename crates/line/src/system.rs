@@ -11,6 +11,6 @@ pub(crate) mod process;
 pub(crate) mod punctual;
 #[cfg(target_os = "linux")]
 mod realtime;
-#[cfg(all(unix, feature = "share"))]
+#[cfg(all(any(unix, windows), feature = "share"))]
 pub(crate) mod sockets;
 pub(crate) mod sync;

@@ -73,6 +73,10 @@ mod share {
         include!("share/place.rs");
     }
 
+    pub(crate) mod proof {
+        include!("share/proof.rs");
+    }
+
     /// A time as it travels.
     pub(crate) fn nanos(time: std::time::Duration) -> u64 {
         u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)

@@ -129,7 +129,7 @@ impl Errand {
     }
 
     /// Whether somebody still waits for it.
-    #[cfg(all(unix, feature = "share"))]
+    #[cfg(all(any(unix, windows), feature = "share"))]
     pub(super) fn is_wanted(&self) -> bool {
         self.wanted.load(crate::system::sync::atomic::Ordering::Acquire)
     }

@@ -5,6 +5,7 @@
 //! program could have made itself.
 
 mod at_door;
+mod strangers;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -13,11 +14,11 @@ use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use drivebus_rtu::{Instant, UnitAddress};
-use rustix::process::{Resource, getrlimit};
 
 use crate::ask::Ask;
 use crate::bus::call::{Call, Wanted};
 use crate::bus::errand::pdu_of;
+use crate::bus::host::strangers::Strangers;
 use crate::bus::port::Port;
 use crate::bus::programs::{Programs, Seat};
 use crate::error::Failure;
@@ -32,10 +33,11 @@ use crate::share::message::{
     Characters, Figures, GREETING, Hello, LET_IN, Order, SENT_AWAY, Told, VERSION, Welcome, Wish,
 };
 use crate::share::place::{Door, Place, ReachedBy};
+use crate::share::proof;
 use crate::system::clock::monotonic;
 use crate::system::inherited::Kept;
 use crate::system::process::{self, Life, Peer, Process};
-use crate::system::sockets::{Shutdown, UnixStream};
+use crate::system::sockets::{Shutdown, Stream};
 use crate::system::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use crate::system::sync::{Mutex, MutexGuard, PoisonError, thread};
 use crate::trace::{Direction, Overheard};
@@ -63,7 +65,7 @@ const REMEMBERED: usize = 64;
 pub(super) struct Host {
     door: Door,
     /// Its end wakes the thread at the door.
-    waker: Kept<UnixStream>,
+    waker: Kept<Stream>,
     opened_by: Process,
 }
 
@@ -71,6 +73,7 @@ pub(super) struct Host {
 #[derive(Debug, Default)]
 pub(super) struct Guests {
     inside: Mutex<Inside>,
+    strangers: Strangers,
     /// Why nobody can come in now.
     kept_out: Mutex<Option<String>>,
 }
@@ -79,7 +82,7 @@ pub(super) struct Guests {
 struct Inside {
     connections: u64,
     /// To end them.
-    streams: BTreeMap<u64, Arc<Kept<UnixStream>>>,
+    streams: BTreeMap<u64, Arc<Kept<Stream>>>,
     /// To say over them that the port was opened again.
     watching: BTreeMap<u64, Channel>,
     programs: Vec<Arc<Entry>>,
@@ -101,7 +104,7 @@ struct Entry {
 impl Host {
     /// Lets programs in through `door` to the line that `port` is.
     pub(super) fn open(door: Door, guests: Arc<Guests>, port: Weak<Port>) -> io::Result<Self> {
-        let (waker, woken) = UnixStream::pair()?;
+        let (waker, woken) = Stream::pair()?;
         let (waker, woken) = (Kept::new(waker), Kept::new(woken));
         let entrances = Arc::clone(&door.entrances);
         thread::Builder::new().name("drivebus-door".to_owned()).spawn(move || {
@@ -188,12 +191,12 @@ impl Guests {
         self: &Arc<Self>,
         hello: &Hello,
         peer: &Peer,
-        stream: Arc<Kept<UnixStream>>,
+        stream: Arc<Kept<Stream>>,
         programs: &Arc<Programs>,
     ) -> Result<Visit, String> {
         let mut inside = self.lock();
         let (name, process) = (readable(&hello.program), peer.process);
-        let name = match peer.user.filter(|&user| user != process::user()) {
+        let name = match peer.other_user() {
             Some(user) => format!("{name} of {}", user_named(user)),
             None => name,
         };
@@ -204,8 +207,7 @@ impl Guests {
                 && if process == 0 { entry.name == name } else { !entry.life.is_gone() }
         };
         let known = inside.programs.iter().find(is_it).cloned();
-        let files = getrlimit(Resource::Nofile).current.and_then(|files| usize::try_from(files).ok());
-        let files = files.unwrap_or(usize::MAX);
+        let files = process::most_files();
         let most = CONNECTIONS.min(files / 2);
         if inside.streams.len() >= (most + IN_RESERVE).min(files / 4 * 3) {
             return Err(format!(
@@ -229,7 +231,7 @@ impl Guests {
             let entry = Arc::new(Entry {
                 name,
                 process,
-                life: Arc::new(Life::of(process)),
+                life: Arc::new(peer.life()),
                 seat: Arc::downgrade(&seat),
                 connections: AtomicUsize::new(0),
                 calls: AtomicU64::new(0),
@@ -284,16 +286,28 @@ impl Drop for Visit {
 }
 
 /// Serves one connection to its end.
-fn serve(stream: UnixStream, reached_by: ReachedBy, guests: &Arc<Guests>, port: &Weak<Port>) {
-    let peer = process::peer(&stream);
-    let is_of_another = peer.user.is_some_and(|user| user != process::user());
+fn serve(stream: Stream, reached_by: ReachedBy, guests: &Arc<Guests>, port: &Weak<Port>) {
+    let mut peer = process::peer(&stream);
+    let is_of_another = peer.other_user().is_some();
+    let Ok(mut channel) = Channel::new(stream, MOST, Arc::new(Life::Unknown)) else { return };
     let may_come_in = match reached_by {
+        #[cfg(unix)]
         ReachedBy::ThisUser => !is_of_another,
         // The system looked whether it may connect.
+        #[cfg(unix)]
         ReachedBy::Group => true,
+        #[cfg(unix)]
         ReachedBy::Anybody => peer.user.is_some() && !is_of_another,
+        ReachedBy::Strangers(secret) => {
+            let _one = guests.strangers.enter(&channel);
+            channel.lets_say(proof::MOST);
+            // Nothing is said to who does not know the secret: not even that it does not.
+            let Some(process) = proof::of_guest(&mut channel, &secret, monotonic() + HURRY) else { return };
+            channel.lets_say(MOST);
+            peer.process = process;
+            !is_of_another
+        }
     };
-    let Ok(mut channel) = Channel::new(stream, MOST, Arc::new(Life::Unknown)) else { return };
     let let_in = if may_come_in {
         let_in(&mut channel, &peer, guests, port)
     } else {

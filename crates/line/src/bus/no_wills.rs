@@ -1,4 +1,5 @@
-//! Where programs cannot share a port, nobody would carry out a last will: none is left.
+//! Where nobody would carry out a last will, none is left: where programs cannot share a port, and where a lock does not tell
+//! that a program is gone.
 
 use std::sync::Arc;
 
@@ -8,10 +9,18 @@ use crate::error::Failure;
 use crate::line::Opener;
 use crate::options::{BusOptions, LastWill};
 use crate::ports::key::PortKey;
+#[cfg(all(any(unix, windows), feature = "share"))]
+use crate::share::place::Place;
 
 /// Never called.
 #[cfg(feature = "tcp")]
 pub(super) type Then = Box<dyn FnOnce(bool) + Send>;
+
+/// Whether there is a will at a place: there is none.
+#[cfg(all(any(unix, windows), feature = "share"))]
+pub(super) fn is_any(_place: &Place) -> bool {
+    false
+}
 
 /// There are none.
 #[derive(Debug)]
@@ -51,6 +60,9 @@ impl Wills {
     pub(super) fn keeps_from(&self, _unit: Option<UnitAddress>) -> Option<Failure> {
         None
     }
+
+    #[cfg(all(any(unix, windows), feature = "share"))]
+    pub(super) fn look_soon(self: &Arc<Self>) {}
 
     pub(super) fn notes(&self) -> Vec<String> {
         Vec::new()

@@ -35,13 +35,13 @@ impl Openings {
     }
 
     /// The line is used as another program opened it.
-    #[cfg(all(unix, feature = "share"))]
+    #[cfg(all(any(unix, windows), feature = "share"))]
     pub(super) fn open_elsewhere(&self) {
         self.was_open.store(true, Ordering::Release);
     }
 
     /// How often the line was opened again, if it is opened now.
-    #[cfg(all(unix, feature = "share"))]
+    #[cfg(all(any(unix, windows), feature = "share"))]
     pub(super) fn with_one_now(&self) -> u64 {
         let reconnects = self.stats.lock().unwrap_or_else(PoisonError::into_inner).reconnects;
         reconnects + u64::from(self.was_open.load(Ordering::Acquire))
@@ -80,7 +80,7 @@ mod tests {
         assert_eq!(reconnects(&stats), 0);
     }
 
-    #[cfg(all(unix, feature = "share"))]
+    #[cfg(all(any(unix, windows), feature = "share"))]
     #[test]
     fn what_another_program_had_open_is_opened_again() {
         let stats = Arc::default();

@@ -14,7 +14,7 @@ use crate::bus::clock::Clock;
 use crate::bus::errand::Errand;
 use crate::bus::figures::Figures;
 use crate::bus::halts_told::HaltsTold;
-#[cfg(any(feature = "tcp", all(unix, feature = "share")))]
+#[cfg(any(feature = "tcp", all(any(unix, windows), feature = "share")))]
 use crate::bus::programs::Programs;
 use crate::bus::wills::Wills;
 use crate::error::Failure;
@@ -59,7 +59,7 @@ pub(crate) struct Port {
     clock: Clock,
     pub(super) trace: Trace,
     /// Those who use the line through this program.
-    #[cfg(any(feature = "tcp", all(unix, feature = "share")))]
+    #[cfg(any(feature = "tcp", all(any(unix, windows), feature = "share")))]
     pub(super) programs: Arc<Programs>,
     /// What is left to be done for programs that are gone.
     pub(super) wills: Arc<Wills>,
@@ -94,7 +94,7 @@ impl Port {
             opened_by: Process::current(),
             clock,
             trace: Trace::default(),
-            #[cfg(any(feature = "tcp", all(unix, feature = "share")))]
+            #[cfg(any(feature = "tcp", all(any(unix, windows), feature = "share")))]
             programs: Arc::default(),
             wills,
             ends: OnceLock::new(),

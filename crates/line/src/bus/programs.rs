@@ -24,7 +24,7 @@ struct Client {
 
 impl Programs {
     /// The lowest number that nobody has; of more programs than there are numbers, the rest have the last one together.
-    #[cfg(any(test, all(unix, feature = "share")))]
+    #[cfg(any(test, all(any(unix, windows), feature = "share")))]
     pub(crate) fn seat(self: &Arc<Self>) -> Seat {
         self.take(None)
     }

@@ -3,8 +3,7 @@
 //! The port decides: who opens it has it, and serves the others; who finds it taken looks for the one who serves it. When
 //! that one ends, all others do the same again, and one of them has the port.
 
-use std::net::{Shutdown, SocketAddr};
-use std::os::unix::net::UnixStream;
+use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 use std::thread;
@@ -13,6 +12,7 @@ use std::time::Duration;
 use crate::bus::host::{Guests, Host};
 use crate::bus::openings::Openings;
 use crate::bus::port::{Ends, Port};
+use crate::bus::wills::is_any;
 use crate::health::stats::{Program, Stats};
 use crate::line::{Line, Opener, PortError, PortErrorKind};
 use crate::options::{BusOptions, Share};
@@ -20,10 +20,10 @@ use crate::ports::key::PortKey;
 use crate::share::guest::{Guest, Knocked, Vigil, Wait};
 use crate::share::message::{Characters, Hello};
 use crate::share::place::Place;
-use crate::share::will::is_any;
 use crate::system::clock::monotonic;
 use crate::system::inherited::Kept;
 use crate::system::process::own_name;
+use crate::system::sockets::{Shutdown, Stream};
 use crate::turns::order::Priority;
 
 /// How long a port may stay taken whose owner is gone: the system closes what a program that was killed had open, one
@@ -57,10 +57,10 @@ pub(super) struct Sharing {
     /// Pieces of what went over the line that the program which has the port could not tell this one.
     left_out: AtomicU64,
     /// To end the wait for the end of the program that has the port.
-    vigil: Mutex<Option<Arc<Kept<UnixStream>>>>,
+    vigil: Mutex<Option<Arc<Kept<Stream>>>>,
 }
 
-fn end_vigil(connection: Option<Arc<Kept<UnixStream>>>) {
+fn end_vigil(connection: Option<Arc<Kept<Stream>>>) {
     if let Some(connection) = connection {
         // It may have ended already.
         let _ = connection.shutdown(Shutdown::Both);

@@ -27,6 +27,7 @@ use crate::share::guest::readable;
 use crate::share::message::Characters;
 use crate::share::nanos;
 use crate::share::place::Place;
+pub(super) use crate::share::will::is_any;
 use crate::share::will::{Found, Orphan, Paper, Will, find};
 use crate::system::clock::monotonic;
 use crate::system::process::own_name;

@@ -24,7 +24,7 @@ impl UnitMeanings {
     }
 
     /// What was set of `unit`, if anything was.
-    #[cfg(all(unix, feature = "share"))]
+    #[cfg(all(any(unix, windows), feature = "share"))]
     pub(crate) fn set_of(&self, unit: UnitAddress) -> Option<Meanings> {
         self.lock().get(&unit).copied()
     }

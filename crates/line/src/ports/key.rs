@@ -44,26 +44,19 @@ impl fmt::Display for PortKey {
     }
 }
 
-#[cfg(all(unix, feature = "share"))]
+#[cfg(all(any(unix, windows), feature = "share"))]
 mod names {
     use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
-    use std::os::unix::fs::MetadataExt;
-    use std::time::UNIX_EPOCH;
 
-    use super::{Kind, PortKey, Server};
+    use super::{Kind, PortKey, Server, device};
     use crate::ports::listening::listening;
 
     impl PortKey {
         /// The ports that may be meant, as file names, the same for every name of a port: one, or of a serial server one for
         /// each address that its name has. None while there is no such port.
         pub(crate) fn names(&self) -> Vec<String> {
-            use std::os::unix::fs::FileTypeExt;
-
             match &self.0 {
-                Kind::Path(path) => {
-                    let status = std::fs::metadata(path).ok().filter(|status| status.file_type().is_char_device());
-                    status.iter().map(|status| device(status.dev(), status.rdev())).collect()
-                }
+                Kind::Path(path) => device::name(path).into_iter().collect(),
                 Kind::Server(Server { host, port }) => match (host.as_str(), *port).to_socket_addrs() {
                     Ok(addresses) => addresses.map(server).collect(),
                     // Whoever opens it says what is wrong with the name; who meets others over it needs no address.
@@ -77,45 +70,10 @@ mod names {
             peer.map(server).or_else(|| self.names().into_iter().next())
         }
 
-        /// When it was made, where another one may have its name next: a pseudo-terminal, an adapter that is plugged in
-        /// again. 0 where that is not known.
-        pub(crate) fn made(&self) -> u64 {
-            let Kind::Path(path) = &self.0 else { return 0 };
-            let Ok(status) = std::fs::metadata(path) else { return 0 };
-            let made = status.created().ok().and_then(|made| made.duration_since(UNIX_EPOCH).ok());
-            match made {
-                Some(made) => u64::try_from(made.as_nanos()).unwrap_or(u64::MAX),
-                // Their file system does not say; what changes a node there, `chmod`, is not done while it is in use.
-                None if is_pseudo_terminal(status.rdev()) => status
-                    .ctime()
-                    .cast_unsigned()
-                    .wrapping_mul(1_000_000_000)
-                    .wrapping_add(status.ctime_nsec().cast_unsigned()),
-                None => 0,
-            }
-        }
-
         /// Whether opening it keeps other programs out, as the lock of a serial port does.
         pub(crate) fn locks(&self) -> bool {
             matches!(self.0, Kind::Path(_))
         }
-    }
-
-    /// The device that a node stands for, wherever the node is: containers have nodes of their own. But a pseudo-terminal of a
-    /// container may have the number of another one's, on a file system of its own. Source: `devices.txt` of Linux.
-    fn device(file_system: u64, number: u64) -> String {
-        if is_pseudo_terminal(number) { format!("port-{file_system:x}-{number:x}") } else { format!("port-{number:x}") }
-    }
-
-    #[cfg(target_os = "linux")]
-    fn is_pseudo_terminal(number: u64) -> bool {
-        (136..=143).contains(&rustix::fs::major(number))
-    }
-
-    /// Elsewhere the numbers do not tell.
-    #[cfg(not(target_os = "linux"))]
-    fn is_pseudo_terminal(_number: u64) -> bool {
-        true
     }
 
     /// The server at the other end of a connection to `address`.
@@ -138,7 +96,75 @@ mod names {
     }
 }
 
-#[cfg(all(test, unix, feature = "share"))]
+/// Serial ports of this machine, by the number of their device.
+#[cfg(all(unix, feature = "share"))]
+mod device {
+    use std::fs::Metadata;
+    use std::os::unix::fs::{FileTypeExt, MetadataExt};
+    use std::path::Path;
+    use std::time::UNIX_EPOCH;
+
+    use super::{Kind, PortKey};
+
+    /// What the port that `path` leads to is called; `None` where it leads to none.
+    pub(super) fn name(path: &Path) -> Option<String> {
+        let status = std::fs::metadata(path).ok().filter(|status: &Metadata| status.file_type().is_char_device())?;
+        Some(numbered(status.dev(), status.rdev()))
+    }
+
+    impl PortKey {
+        /// When it was made, where another one may have its name next: a pseudo-terminal, an adapter that is plugged in
+        /// again. 0 where that is not known.
+        pub(crate) fn made(&self) -> u64 {
+            let Kind::Path(path) = &self.0 else { return 0 };
+            let Ok(status) = std::fs::metadata(path) else { return 0 };
+            let made = status.created().ok().and_then(|made| made.duration_since(UNIX_EPOCH).ok());
+            match made {
+                Some(made) => u64::try_from(made.as_nanos()).unwrap_or(u64::MAX),
+                // Their file system does not say; what changes a node there, `chmod`, is not done while it is in use.
+                None if is_pseudo_terminal(status.rdev()) => status
+                    .ctime()
+                    .cast_unsigned()
+                    .wrapping_mul(1_000_000_000)
+                    .wrapping_add(status.ctime_nsec().cast_unsigned()),
+                None => 0,
+            }
+        }
+    }
+
+    /// The device that a node stands for, wherever the node is: containers have nodes of their own. But a pseudo-terminal of a
+    /// container may have the number of another one's, on a file system of its own. Source: `devices.txt` of Linux.
+    fn numbered(file_system: u64, number: u64) -> String {
+        if is_pseudo_terminal(number) { format!("port-{file_system:x}-{number:x}") } else { format!("port-{number:x}") }
+    }
+
+    #[cfg(target_os = "linux")]
+    fn is_pseudo_terminal(number: u64) -> bool {
+        (136..=143).contains(&rustix::fs::major(number))
+    }
+
+    /// Elsewhere the numbers do not tell.
+    #[cfg(not(target_os = "linux"))]
+    fn is_pseudo_terminal(_number: u64) -> bool {
+        true
+    }
+}
+
+/// Serial ports of this machine, by their names: `COM3`, and `\\.\COM3`, as who opens it says.
+#[cfg(all(windows, feature = "share"))]
+mod device {
+    use std::path::Path;
+
+    /// What the port is called that `path` names, whether there is one or not: who opens it says.
+    pub(super) fn name(path: &Path) -> Option<String> {
+        let name = path.to_str()?.to_uppercase();
+        let name = name.strip_prefix(r"\\.\").unwrap_or(&name);
+        let is_plain = |letter: char| letter.is_ascii_alphanumeric();
+        Some(format!("port-{}", name.replace(|letter| !is_plain(letter), "_")))
+    }
+}
+
+#[cfg(all(test, any(unix, windows), feature = "share"))]
 mod tests {
     #![expect(clippy::unwrap_used, reason = "a test may panic")]
 

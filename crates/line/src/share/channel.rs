@@ -1,42 +1,29 @@
 //! One connection between two programs: whole messages in and out, none longer than it may be.
 
-use std::io::{self, Read};
-use std::os::fd::AsFd;
-use std::os::unix::net::UnixStream;
+use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_rtu::Instant;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::io::Errno;
-use rustix::net::SendFlags;
+use rustix::event::{PollFd, PollFlags};
+use rustix::fd::AsFd;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::system::clock::{wait_for, wait_for_any};
+use crate::system::clock::{monotonic, wait_for, wait_for_any};
 use crate::system::inherited::Kept;
 use crate::system::process::Life;
+use crate::system::sockets::{Stream, Waits};
 
 /// How long a program may leave unread what it is told, before it is cut off.
 const UNREAD: Duration = Duration::from_secs(1);
-/// What a write to who is gone is to be: an error, and no signal that ends the program. Apple has this of a socket, not of a
-/// write.
-#[cfg(not(target_vendor = "apple"))]
-const QUIETLY: SendFlags = SendFlags::NOSIGNAL;
-#[cfg(target_vendor = "apple")]
-const QUIETLY: SendFlags = SendFlags::empty();
-/// What is asked of a connection to hear that its other side is gone: some systems tell only by its end of it.
-#[cfg(any(target_os = "linux", target_os = "android"))]
-const GONE: PollFlags = PollFlags::RDHUP;
-#[cfg(not(any(target_os = "linux", target_os = "android")))]
-const GONE: PollFlags = PollFlags::HUP;
 /// Bytes before a message: its length.
 const HEAD: usize = 4;
 
 /// A connection.
 #[derive(Debug)]
 pub(crate) struct Channel {
-    stream: Arc<Kept<UnixStream>>,
+    stream: Arc<Kept<Stream>>,
     /// The program at the other end: gone, it says nothing more, whoever has its descriptors.
     other: Arc<Life>,
     came: Vec<u8>,
@@ -48,17 +35,23 @@ pub(crate) struct Channel {
 
 impl Channel {
     /// `most` is how long a message of the other side may be, whose program is `other`.
-    pub(crate) fn new(stream: UnixStream, most: usize, other: Arc<Life>) -> io::Result<Self> {
-        stream.set_nonblocking(false)?;
-        stream.set_write_timeout(Some(UNREAD))?;
-        #[cfg(target_vendor = "apple")]
-        rustix::net::sockopt::set_socket_nosigpipe(&stream, true)?;
+    pub(crate) fn new(stream: Stream, most: usize, other: Arc<Life>) -> io::Result<Self> {
+        Self::with_patience(stream, most, other, UNREAD)
+    }
+
+    fn with_patience(mut stream: Stream, most: usize, other: Arc<Life>, patience: Duration) -> io::Result<Self> {
+        stream.leaves_unread(patience)?;
         Ok(Self { stream: Arc::new(Kept::new(stream)), other, came: Vec::new(), unsent: Vec::new(), most })
     }
 
     /// Whose program is at the other end is known now.
     pub(crate) fn depends_on(&mut self, other: Arc<Life>) {
         self.other = other;
+    }
+
+    /// A message of the other side may be as long as that from now on.
+    pub(crate) fn lets_say(&mut self, most: usize) {
+        self.most = most;
     }
 
     pub(crate) fn say(&mut self, message: &impl Serialize) -> io::Result<()> {
@@ -74,13 +67,13 @@ impl Channel {
     /// As [`say`](Self::say), and waits for nobody: where the other side does not read, the message is left out, and this
     /// is `false`.
     pub(crate) fn say_in_passing(&mut self, message: &impl Serialize) -> io::Result<bool> {
-        if !self.finish(SendFlags::DONTWAIT)? {
+        if !self.finish(Waits::No)? {
             return Ok(false);
         }
         let body = postcard::to_extend(message, vec![0; HEAD]).map_err(io::Error::other)?;
         self.unsent = with_length(body)?;
         let whole = self.unsent.len();
-        self.finish(SendFlags::DONTWAIT)?;
+        self.finish(Waits::No)?;
         // What has begun to go out follows with the next one.
         if self.unsent.len() == whole {
             self.unsent.clear();
@@ -92,7 +85,7 @@ impl Channel {
     fn send(&mut self, message: Vec<u8>) -> io::Result<()> {
         let message = with_length(message)?;
         self.unsent.extend_from_slice(&message);
-        match self.finish(SendFlags::empty()) {
+        match self.finish(Waits::AWhile) {
             Ok(true) => Ok(()),
             Ok(false) => Err(io::ErrorKind::TimedOut.into()),
             Err(error) => Err(error),
@@ -100,13 +93,12 @@ impl Channel {
     }
 
     /// Sends what is left; `false` where the other side has no room for it.
-    fn finish(&mut self, how: SendFlags) -> io::Result<bool> {
+    fn finish(&mut self, waits: Waits) -> io::Result<bool> {
         while !self.unsent.is_empty() {
-            match rustix::net::send(&**self.stream, &self.unsent, how | QUIETLY) {
+            match self.stream.send(&self.unsent, waits) {
                 Ok(count) => drop(self.unsent.drain(..count)),
-                Err(Errno::INTR) => {}
-                Err(Errno::AGAIN) => return Ok(false),
-                Err(error) => return Err(error.into()),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(false),
+                Err(error) => return Err(error),
             }
         }
         Ok(true)
@@ -132,7 +124,7 @@ impl Channel {
                 return Ok(None);
             }
             let mut piece = [0; 4_096];
-            match (&**self.stream).read(&mut piece) {
+            match self.stream.read(&mut piece) {
                 Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
                 Ok(count) => self.came.extend_from_slice(&piece[..count]),
                 Err(error) if matches!(error.kind(), io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock) => {}
@@ -143,6 +135,9 @@ impl Channel {
 
     /// Whether there is something to read before `until`. What a program said before it ended is still heard.
     fn something_comes(&self, until: Instant) -> io::Result<bool> {
+        if let Some(turn) = self.stream.looks_up() {
+            return self.something_comes_in_turns(until, turn);
+        }
         let Some(end) = self.other.end() else {
             return Ok(wait_for(self.stream.as_fd(), PollFlags::IN, until)?.is_some());
         };
@@ -154,6 +149,22 @@ impl Channel {
         }
     }
 
+    /// As [`something_comes`](Self::something_comes), on a connection of which the system may not tell that it was ended here.
+    fn something_comes_in_turns(&self, until: Instant, turn: Duration) -> io::Result<bool> {
+        loop {
+            let now = monotonic();
+            if wait_for(self.stream.as_fd(), PollFlags::IN, until.min(now + turn))?.is_some() {
+                return Ok(true);
+            }
+            if self.stream.is_ended() {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            if now >= until {
+                return Ok(false);
+            }
+        }
+    }
+
     /// Whether a message has begun to come.
     pub(crate) fn has_begun(&self) -> bool {
         !self.came.is_empty()
@@ -161,9 +172,7 @@ impl Channel {
 
     /// Whether the other side is still there.
     pub(crate) fn is_there(&self) -> bool {
-        let mut descriptors = [PollFd::new(&**self.stream, GONE)];
-        let now = Timespec { tv_sec: 0, tv_nsec: 0 };
-        !matches!(poll(&mut descriptors, Some(&now)), Ok(1..)) && !self.other.is_gone()
+        self.stream.is_there() && !self.other.is_gone()
     }
 
     /// The same connection, for who only says something there; who has this one says nothing any more.
@@ -173,7 +182,7 @@ impl Channel {
     }
 
     /// The same connection, to end it from elsewhere.
-    pub(crate) fn end(&self) -> Arc<Kept<UnixStream>> {
+    pub(crate) fn end(&self) -> Arc<Kept<Stream>> {
         Arc::clone(&self.stream)
     }
 
@@ -200,98 +209,135 @@ fn with_length(mut message: Vec<u8>) -> io::Result<Vec<u8>> {
     message[..HEAD].copy_from_slice(&length.to_le_bytes());
     Ok(message)
 }
-
 #[cfg(test)]
 mod tests {
-    use std::io::Write;
-
     use super::*;
 
-    use crate::system::clock::monotonic;
+    use crate::system::sockets::{Loopback, Shutdown};
 
-    fn pair() -> (Channel, UnixStream) {
-        let (one, other) = UnixStream::pair().unwrap();
-        (Channel::new(one, 100, Arc::new(Life::Unknown)).unwrap(), other)
+    /// The two ends of a connection, of each kind that there is.
+    fn pairs() -> impl Iterator<Item = (Stream, Stream)> {
+        let over_loopback = Loopback::pair().unwrap();
+        [Stream::pair().unwrap(), (Stream::Tcp(over_loopback.0), Stream::Tcp(over_loopback.1))].into_iter()
+    }
+
+    fn channel(stream: Stream, most: usize) -> Channel {
+        Channel::new(stream, most, Arc::new(Life::Unknown)).unwrap()
+    }
+
+    fn write(far: &Stream, bytes: &[u8]) {
+        assert_eq!(far.send(bytes, Waits::AWhile).unwrap(), bytes.len());
+    }
+
+    /// What has been written is on its way, and comes.
+    fn soon() -> Instant {
+        monotonic() + Duration::from_secs(60)
     }
 
     #[test]
     fn messages_come_whole_however_they_are_cut() {
-        let (mut channel, mut far) = pair();
-        let words: Vec<u16> = vec![1, 2, 300];
-        let mut bytes = postcard::to_extend(&words, vec![0; HEAD]).unwrap();
-        let length = u8::try_from(bytes.len() - HEAD).unwrap();
-        bytes[0] = length;
-        let twice = [bytes.clone(), bytes].concat();
-        let (last, most) = twice.split_last().unwrap();
-        far.write_all(most).unwrap();
-        let now = monotonic();
-        assert_eq!(channel.hear::<Vec<u16>>(now).unwrap(), Some(words.clone()));
-        assert_eq!(channel.hear::<Vec<u16>>(now).unwrap(), None);
-        assert!(channel.has_begun());
-        far.write_all(&[*last]).unwrap();
-        assert_eq!(channel.hear::<Vec<u16>>(now).unwrap(), Some(words));
-        assert!(!channel.has_begun() && channel.is_there());
-        drop(far);
-        assert!(!channel.is_there());
-        assert_eq!(channel.hear::<u8>(now).unwrap_err().kind(), io::ErrorKind::UnexpectedEof);
+        for (one, far) in pairs() {
+            let mut channel = channel(one, 100);
+            let words: Vec<u16> = vec![1, 2, 300];
+            let mut bytes = postcard::to_extend(&words, vec![0; HEAD]).unwrap();
+            let length = u8::try_from(bytes.len() - HEAD).unwrap();
+            bytes[0] = length;
+            let twice = [bytes.clone(), bytes].concat();
+            let (last, most) = twice.split_last().unwrap();
+            write(&far, most);
+            assert_eq!(channel.hear::<Vec<u16>>(soon()).unwrap(), Some(words.clone()));
+            assert_eq!(channel.hear::<Vec<u16>>(monotonic()).unwrap(), None);
+            assert!(channel.has_begun());
+            write(&far, &[*last]);
+            assert_eq!(channel.hear::<Vec<u16>>(soon()).unwrap(), Some(words));
+            assert!(!channel.has_begun() && channel.is_there());
+            drop(far);
+            assert_eq!(channel.hear::<u8>(soon()).unwrap_err().kind(), io::ErrorKind::UnexpectedEof);
+            assert!(!channel.is_there());
+        }
     }
 
     #[test]
     fn what_is_too_long_is_refused_before_it_comes() {
-        let (mut channel, mut far) = pair();
-        far.write_all(&101_u32.to_le_bytes()).unwrap();
-        let error = channel.hear::<u8>(monotonic()).unwrap_err().to_string();
-        assert_eq!(error, "a message of 101 bytes is announced; 100 may be sent");
+        for (one, far) in pairs() {
+            let mut channel = channel(one, 1_000);
+            channel.lets_say(100);
+            write(&far, &101_u32.to_le_bytes());
+            let error = channel.hear::<u8>(soon()).unwrap_err().to_string();
+            assert_eq!(error, "a message of 101 bytes is announced; 100 may be sent");
+        }
     }
 
     #[test]
     fn what_is_no_message_is_refused() {
-        let (mut channel, mut far) = pair();
-        far.write_all(&[2, 0, 0, 0, 0xFF, 0xFF]).unwrap();
-        assert_eq!(channel.hear::<u32>(monotonic()).unwrap_err().kind(), io::ErrorKind::InvalidData);
+        for (one, far) in pairs() {
+            let mut channel = channel(one, 100);
+            write(&far, &[2, 0, 0, 0, 0xFF, 0xFF]);
+            assert_eq!(channel.hear::<u32>(soon()).unwrap_err().kind(), io::ErrorKind::InvalidData);
+        }
     }
 
     #[test]
     fn who_reads_nothing_is_cut_off() {
-        let (mut channel, _far) = pair();
-        channel.stream.set_write_timeout(Some(Duration::from_millis(1))).unwrap();
-        let said = (0..10_000).map(|_| channel.say_bytes(&[0; 100])).find(Result::is_err);
-        assert!(said.is_some());
+        for (one, _far) in pairs() {
+            let quick = Duration::from_millis(1);
+            let mut channel = Channel::with_patience(one, 100, Arc::new(Life::Unknown), quick).unwrap();
+            let said = (0..1_000_000).map(|_| channel.say_bytes(&[0; 100])).find(Result::is_err);
+            assert!(said.is_some());
+        }
     }
 
     #[test]
     fn what_is_said_in_passing_waits_for_nobody_and_is_whole_or_left_out() {
-        let (mut channel, far) = pair();
-        let mut said = Vec::new();
-        // Longer and longer, so that some end where there is no room any more.
-        let left_out = (1..u16::MAX).find(|&count| {
-            let is_said = channel.say_in_passing(&vec![count; usize::from(count)]).unwrap();
-            said.extend(is_said.then_some(count));
-            !is_said
-        });
-        assert!(left_out.is_some());
-        let mut far = Channel::new(far, 1 << 20, Arc::new(Life::Unknown)).unwrap();
-        let heard = said.iter().map(|_| {
-            let message = far.hear::<Vec<u16>>(monotonic()).unwrap();
-            // What had begun to go out goes on now that there is room.
-            channel.finish(SendFlags::DONTWAIT).unwrap();
-            message.or_else(|| far.hear(monotonic()).unwrap()).unwrap()
-        });
-        assert!(heard.zip(&said).all(|(message, &count)| message == vec![count; usize::from(count)]));
+        for (one, far) in pairs() {
+            let mut channel = channel(one, 100);
+            let mut said = Vec::new();
+            // Longer and longer, so that some end where there is no room any more.
+            let left_out = (1..u16::MAX).find(|&count| {
+                let is_said = channel.say_in_passing(&vec![count; usize::from(count)]).unwrap();
+                said.extend(is_said.then_some(count));
+                !is_said
+            });
+            assert!(left_out.is_some());
+            let mut far = self::channel(far, 1 << 20);
+            let heard = said.iter().map(|_| {
+                loop {
+                    // What had begun to go out goes on as soon as there is room.
+                    channel.finish(Waits::No).unwrap();
+                    if let Some(message) = far.hear::<Vec<u16>>(monotonic()).unwrap() {
+                        break message;
+                    }
+                }
+            });
+            assert!(heard.zip(&said).all(|(message, &count)| message == vec![count; usize::from(count)]));
+        }
     }
 
     #[test]
+    fn what_is_ended_here_is_not_waited_for() {
+        for how in [Shutdown::Read, Shutdown::Both] {
+            for (one, _far) in pairs() {
+                let mut channel = channel(one, 100);
+                let end = channel.end();
+                let ends = std::thread::spawn(move || end.shutdown(how).unwrap());
+                assert_eq!(channel.hear::<u8>(soon()).unwrap_err().kind(), io::ErrorKind::UnexpectedEof);
+                ends.join().unwrap();
+            }
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
     fn who_has_ended_is_gone_whoever_has_its_descriptors() {
         let mut child = std::process::Command::new("cat").stdin(std::process::Stdio::piped()).spawn().unwrap();
-        let (one, mut held) = UnixStream::pair().unwrap();
+        let (one, held) = Stream::pair().unwrap();
         let mut channel = Channel::new(one, 100, Arc::new(Life::of(child.id()))).unwrap();
-        held.write_all(&[1, 0, 0, 0, 7]).unwrap();
+        write(&held, &[1, 0, 0, 0, 7]);
         drop(child.stdin.take());
         child.wait().unwrap();
-        let far = monotonic() + Duration::from_secs(60);
-        assert_eq!(channel.hear::<u8>(far).unwrap(), Some(7), "what it said before");
+        assert_eq!(channel.hear::<u8>(soon()).unwrap(), Some(7), "what it said before");
         if cfg!(target_os = "linux") {
-            assert_eq!(channel.hear::<u8>(far).unwrap_err().kind(), io::ErrorKind::UnexpectedEof);
+            assert_eq!(channel.hear::<u8>(soon()).unwrap_err().kind(), io::ErrorKind::UnexpectedEof);
             assert!(!channel.is_there());
         }
     }

@@ -18,6 +18,8 @@ use rustix::process::{getegid, geteuid};
 /// The variables that put the folders elsewhere.
 const ELSEWHERE: &str = "DRIVEBUS_RUNTIME_DIR";
 const MACHINE_ELSEWHERE: &str = "DRIVEBUS_MACHINE_DIR";
+/// Programs meet on the loopback, as they do where there are no Unix sockets: for the tests of that, and for nobody else.
+const OVER_LOOPBACK: &str = "DRIVEBUS_TESTS_OVER_LOOPBACK";
 const OF_MACHINE: &str = if cfg!(target_os = "linux") { "/run/drivebus" } else { "/var/run/drivebus" };
 /// Files of it belong to its group, and only to who made them.
 const MODE: u32 = 0o3771;
@@ -56,6 +58,11 @@ pub(super) fn of_user() -> io::Result<(PathBuf, bool)> {
         return Err(io::Error::new(io::ErrorKind::PermissionDenied, why));
     }
     Ok((folder, is_fixed))
+}
+
+/// Whether the programs of a user meet on the loopback.
+pub(super) fn is_over_loopback() -> bool {
+    std::env::var_os(OVER_LOOPBACK).is_some()
 }
 
 fn is_of(path: &Path, user: u32) -> bool {

@@ -4,7 +4,6 @@
 //! where the line is.
 
 use std::io;
-use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -13,10 +12,13 @@ use drivebus_rtu::Instant;
 
 use crate::share::channel::Channel;
 use crate::share::message::{GREETING, Hello, LET_IN, SENT_AWAY, Told, VERSION, Welcome, Wish};
-use crate::share::place::{Nobody, Place};
+use crate::share::place::{Nobody, Place, Reached};
+use crate::share::proof::{self, Unproven};
+use crate::share::secret::Secret;
 use crate::system::clock::{LOOK_UP, monotonic};
 use crate::system::inherited::Kept;
-use crate::system::process::{self, Life, Process};
+use crate::system::process::{self, Life, Peer, Process};
+use crate::system::sockets::Stream;
 
 /// The longest message of a program that has a port: the statistics of 247 units.
 const MOST: usize = 1 << 20;
@@ -28,6 +30,9 @@ const LETS_GO: Duration = Duration::from_secs(2);
 /// is still to come: then it hangs. Who wants a stop has less time.
 const SILENT: Duration = Duration::from_secs(2);
 const SILENT_ON_A_STOP: Duration = Duration::from_secs(1);
+/// What is said of somebody on the loopback who has the address of a program that is gone.
+const STRANGER: &str = "what listens on the loopback where this port was shared is no program of this user's: it does not know \
+    their secret, and was told nothing; the port is shared again as soon as one of them has opened it";
 /// How long nothing may be heard of a port that is not opened again, until it is listened on: any time would do.
 const A_LOOK: Duration = Duration::from_secs(3_600);
 
@@ -44,6 +49,10 @@ pub(crate) struct Guest {
     seen: AtomicU64,
     /// The program that has the port: gone when it is, whoever has its descriptors.
     life: Arc<Life>,
+    /// The secret by which it is known, where there is one: who has another is another program.
+    secret: Option<Secret>,
+    /// By how many nanoseconds the clock here is ahead of its.
+    ahead: i64,
     pool: Mutex<Pool>,
     freed: Condvar,
     gone: AtomicBool,
@@ -77,7 +86,7 @@ impl std::fmt::Display for Host {
 pub(crate) struct Vigil {
     channel: Channel,
     /// The other end, where the program that has the port has none: only its life is watched then.
-    _own: Option<Kept<UnixStream>>,
+    _own: Option<Kept<Stream>>,
 }
 
 /// What came of wanting to wait at the program that has the port.
@@ -103,7 +112,7 @@ impl Vigil {
     }
 
     /// How to end it from here.
-    pub(crate) fn connection(&self) -> Arc<Kept<UnixStream>> {
+    pub(crate) fn connection(&self) -> Arc<Kept<Stream>> {
         self.channel.end()
     }
 }
@@ -155,16 +164,17 @@ impl Guest {
     /// times.
     pub(crate) fn knock(place: &Place, hello: &Hello, before: u64) -> Knocked {
         let until = monotonic() + SILENT;
-        let stream = match place.knock(until) {
-            Ok(stream) => stream,
+        let reached = match place.knock(until) {
+            Ok(reached) => reached,
             Err(Nobody::Absent) => return Knocked::Absent,
             Err(Nobody::Gone) => return Knocked::Gone,
+            #[cfg(unix)]
             Err(Nobody::NotForUs(why)) => return Knocked::Silent(why),
             Err(Nobody::Crowded) => return Knocked::Silent(crowded(SILENT)),
         };
-        match greet(stream, hello, None, SILENT) {
-            Ok((channel, welcome, life)) => {
-                let peer = process::peer(&channel.end());
+        let secret = reached.secret.clone();
+        match greet(reached, hello, None, SILENT) {
+            Ok(Greeted { channel, welcome, life, peer, ahead }) => {
                 let process = if peer.process == 0 { welcome.process } else { peer.process };
                 let is_elsewhere = cfg!(target_os = "linux") && peer.process == 0;
                 let pool = Mutex::new(Pool { idle: vec![channel], under_way: 0 });
@@ -176,6 +186,8 @@ impl Guest {
                     began: welcome.reconnects,
                     seen: AtomicU64::new(welcome.reconnects),
                     life,
+                    secret,
+                    ahead,
                     pool,
                     freed: Condvar::new(),
                     gone: AtomicBool::new(false),
@@ -199,7 +211,7 @@ impl Guest {
             Err(Greeting::Gone) => Wait::Ended,
             Err(Greeting::SentAway(_) | Greeting::Silent(_)) if life.end().is_none() => Wait::Impossible,
             Err(Greeting::SentAway(_) | Greeting::Silent(_)) => {
-                let kept = UnixStream::pair().and_then(|(one, other)| {
+                let kept = Stream::pair().and_then(|(one, other)| {
                     Ok(Vigil { channel: Channel::new(one, MOST, life)?, _own: Some(Kept::new(other)) })
                 });
                 kept.map_or(Wait::Impossible, Wait::Kept)
@@ -209,12 +221,16 @@ impl Guest {
 
     /// Another connection to the program that has the port.
     fn connect(&self, hello: &Hello, patience: Duration) -> Result<Channel, Greeting> {
-        let stream = self.place.knock(monotonic() + patience).map_err(|nobody| match nobody {
+        let reached = self.place.knock(monotonic() + patience).map_err(|nobody| match nobody {
             Nobody::Absent | Nobody::Gone => Greeting::Gone,
             Nobody::Crowded => Greeting::Silent(crowded(patience)),
+            #[cfg(unix)]
             Nobody::NotForUs(why) => Greeting::SentAway(why),
         })?;
-        greet(stream, hello, Some(&self.life), patience).map(|(channel, ..)| channel)
+        if reached.secret != self.secret {
+            return Err(Greeting::Gone); // another program has the port by now
+        }
+        greet(reached, hello, Some(&self.life), patience).map(|greeted| greeted.channel)
     }
 
     /// Where it was met.
@@ -290,7 +306,7 @@ impl Guest {
             match channel.hear::<Told>(monotonic() + LOOK_UP) {
                 Ok(Some(told)) => {
                     heard = monotonic();
-                    if !matches!(told, Told::Waiting) && hear(told) {
+                    if !matches!(told, Told::Waiting) && hear(told.by_clock_ahead(self.ahead)) {
                         return Ok(());
                     }
                     // Where much is told, it is not asked each time.
@@ -358,20 +374,37 @@ impl Guest {
     }
 }
 
+/// A program that let this one in.
+struct Greeted {
+    channel: Channel,
+    welcome: Welcome,
+    life: Arc<Life>,
+    peer: Peer,
+    ahead: i64,
+}
+
 /// Says hello, and waits to be let in, by the program that lives as `known` if that is who is at the other end.
-fn greet(
-    stream: UnixStream,
-    hello: &Hello,
-    known: Option<&Arc<Life>>,
-    patience: Duration,
-) -> Result<(Channel, Welcome, Arc<Life>), Greeting> {
-    let peer = process::peer(&stream);
+fn greet(reached: Reached, hello: &Hello, known: Option<&Arc<Life>>, patience: Duration) -> Result<Greeted, Greeting> {
+    let Reached { stream, secret } = reached;
+    let mut peer = process::peer(&stream);
+    let mut ahead = 0;
     let gone = |_: io::Error| Greeting::Gone;
-    let life = known.map_or_else(|| Arc::new(Life::of(peer.process)), Arc::clone);
+    let life = known.map_or_else(|| Arc::new(peer.life()), Arc::clone);
     if life.is_gone() {
         return Err(Greeting::Gone); // somebody else has its socket, and nobody opens
     }
     let mut channel = Channel::new(stream, MOST, Arc::clone(&life)).map_err(gone)?;
+    if let Some(secret) = secret {
+        channel.lets_say(proof::MOST);
+        let owner = proof::of_owner(&mut channel, &secret, monotonic() + patience);
+        let owner = owner.map_err(|unproven| match unproven {
+            Unproven::Gone => Greeting::Gone,
+            Unproven::Silent => Greeting::Silent(crowded(patience)),
+            Unproven::Stranger => Greeting::Silent(STRANGER.to_owned()),
+        })?;
+        channel.lets_say(MOST);
+        (peer.process, ahead) = (owner.process, owner.ahead);
+    }
     let greeting = postcard::to_extend(hello, [GREETING, &[VERSION]].concat()).map_err(|_| Greeting::Gone)?;
     channel.say_bytes(&greeting).map_err(gone)?;
     let Some(answer) = channel.hear_bytes(monotonic() + patience).map_err(gone)? else {
@@ -382,7 +415,7 @@ fn greet(
     match answer.split_first() {
         Some((&LET_IN, welcome)) => {
             let welcome = postcard::from_bytes(welcome).map_err(|_| Greeting::Gone)?;
-            Ok((channel, welcome, life))
+            Ok(Greeted { channel, welcome, life, peer, ahead })
         }
         Some((&SENT_AWAY, why)) => Err(Greeting::SentAway(readable(&String::from_utf8_lossy(why)))),
         _ => Err(Greeting::Silent("what stands where this port is shared is no program of drivebus".to_owned())),
@@ -397,7 +430,11 @@ fn silence(host: &Host, silent: Duration) -> String {
             "{host} has the port and is stopped, perhaps by Ctrl-Z; let it go on (`fg`, or `kill -CONT {process}`), or end it"
         );
     }
-    let end = if *is_elsewhere { "end it".to_owned() } else { format!("end it (`kill {process}`)") };
+    let end = match process {
+        _ if *is_elsewhere => "end it".to_owned(),
+        process if cfg!(windows) => format!("end it (`taskkill /F /PID {process}`)"),
+        process => format!("end it (`kill {process}`)"),
+    };
     format!("{host} has the port and said nothing for {silent:?}: it hangs; {end}, or let it go on")
 }
 

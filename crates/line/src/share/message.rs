@@ -307,6 +307,18 @@ fn others(meanings: &Meanings) -> Vec<(u8, u8)> {
 }
 
 impl Told {
+    /// With its moments by a clock that is so many nanoseconds ahead of the one by which they were said.
+    pub(crate) fn by_clock_ahead(mut self, ahead: i64) -> Self {
+        let moments = match &mut self {
+            Self::Answer { sent, ended, .. } => [Some(sent), Some(ended)],
+            Self::Failed { sent, ended, .. } => [sent.as_mut(), ended.as_mut()],
+            Self::Heard { at, .. } | Self::Overheard { at, .. } => [Some(at), None],
+            _ => return self,
+        };
+        moments.into_iter().flatten().for_each(|moment| *moment = moment.saturating_add_signed(ahead));
+        self
+    }
+
     /// What became of a call, for the program that wanted it.
     pub(crate) fn failed(error: &CallError, reconnects: u64) -> Self {
         Self::Failed {

@@ -58,9 +58,9 @@ fn spin_until(until: Instant) {
 /// Waits until `descriptor` is ready for one of `events` or has failed, and returns what it is ready for.
 ///
 /// `None` means that `until` was reached. A descriptor that is ready already is found so whatever `until` says.
-#[cfg(all(unix, any(feature = "serial", feature = "tcp", feature = "share")))]
+#[cfg(any(all(unix, any(feature = "serial", feature = "tcp")), all(any(unix, windows), feature = "share")))]
 pub(crate) fn wait_for(
-    descriptor: std::os::fd::BorrowedFd<'_>,
+    descriptor: rustix::fd::BorrowedFd<'_>,
     events: rustix::event::PollFlags,
     until: Instant,
 ) -> std::io::Result<Option<rustix::event::PollFlags>> {
@@ -69,7 +69,7 @@ pub(crate) fn wait_for(
 }
 
 /// As [`wait_for`], for the first of several that is ready; each says what it is ready for.
-#[cfg(all(unix, any(feature = "serial", feature = "tcp", feature = "share")))]
+#[cfg(any(all(unix, any(feature = "serial", feature = "tcp")), all(any(unix, windows), feature = "share")))]
 pub(crate) fn wait_for_any<const COUNT: usize>(
     descriptors: &mut [rustix::event::PollFd<'_>; COUNT],
     until: Instant,

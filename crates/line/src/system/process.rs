@@ -18,7 +18,7 @@ impl Process {
 }
 
 /// What this program is called: as the system shows it, at most 15 bytes.
-#[cfg(all(unix, feature = "share"))]
+#[cfg(all(any(unix, windows), feature = "share"))]
 pub(crate) fn own_name() -> String {
     let shown = std::fs::read_to_string("/proc/self/comm").ok().map(|name| name.trim_end().to_owned());
     let named = || {
@@ -29,7 +29,7 @@ pub(crate) fn own_name() -> String {
 }
 
 /// Whether a process is held, by Ctrl-Z or a debugger. Only Linux tells.
-#[cfg(all(unix, feature = "share"))]
+#[cfg(all(any(unix, windows), feature = "share"))]
 pub(crate) fn is_stopped(process: u32) -> bool {
     // `4711 (name) T …`; the name may hold anything.
     let status = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
@@ -43,7 +43,7 @@ pub(crate) fn user() -> u32 {
 }
 
 /// Who is at the other end of a socket.
-#[cfg(all(unix, feature = "share"))]
+#[cfg(all(any(unix, windows), feature = "share"))]
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Peer {
     /// 0 where the system does not tell: on systems that have no such question, and of a process that has no number here
@@ -53,26 +53,67 @@ pub(crate) struct Peer {
     pub(crate) user: Option<u32>,
 }
 
+#[cfg(all(any(unix, windows), feature = "share"))]
+impl Peer {
+    /// Nobody whom the system tells.
+    pub(crate) const UNKNOWN: Self = Self { process: 0, user: None };
+
+    /// Whether it lives. The system tells that of those whose user it tells: the number of another was only said.
+    pub(crate) fn life(&self) -> Life {
+        if self.user.is_some() { Life::of(self.process) } else { Life::Unknown }
+    }
+
+    /// The number of its user, if that is known to be another one.
+    #[cfg_attr(windows, expect(clippy::unused_self, reason = "no numbers are told there"))]
+    pub(crate) fn other_user(&self) -> Option<u32> {
+        #[cfg(unix)]
+        return self.user.filter(|&other| other != user());
+        #[cfg(not(unix))]
+        None
+    }
+}
+
+/// Who is at the other end of `stream`, as far as the system tells.
+#[cfg(all(any(unix, windows), feature = "share"))]
+pub(crate) fn peer(stream: &crate::system::sockets::Stream) -> Peer {
+    match stream {
+        #[cfg(unix)]
+        crate::system::sockets::Stream::Unix(stream) => peer_of(stream),
+        crate::system::sockets::Stream::Tcp(_) => Peer::UNKNOWN,
+    }
+}
+
+/// How many files this program may have open.
+#[cfg(all(any(unix, windows), feature = "share"))]
+pub(crate) fn most_files() -> usize {
+    #[cfg(unix)]
+    let most = rustix::process::getrlimit(rustix::process::Resource::Nofile).current;
+    // As many as there is memory for.
+    #[cfg(not(unix))]
+    let most = None::<u64>;
+    most.and_then(|most| usize::try_from(most).ok()).unwrap_or(usize::MAX)
+}
+
 /// Who is at the other end of `stream`: who called `connect`, or who called `listen`.
 #[cfg(all(target_os = "linux", feature = "share"))]
-pub(crate) fn peer(stream: &std::os::unix::net::UnixStream) -> Peer {
+pub(crate) fn peer_of(stream: &std::os::unix::net::UnixStream) -> Peer {
     match rustix::net::sockopt::socket_peercred(stream) {
         Ok(found) => Peer {
             process: u32::try_from(found.pid.as_raw_nonzero().get()).unwrap_or(0),
             user: Some(found.uid.as_raw()),
         },
-        Err(_) => Peer { process: 0, user: None },
+        Err(_) => Peer::UNKNOWN,
     }
 }
 
 /// Some program: the system does not tell which.
 #[cfg(all(unix, not(target_os = "linux"), feature = "share"))]
-pub(crate) fn peer(_stream: &std::os::unix::net::UnixStream) -> Peer {
-    Peer { process: 0, user: None }
+pub(crate) fn peer_of(_stream: &std::os::unix::net::UnixStream) -> Peer {
+    Peer::UNKNOWN
 }
 
 /// Whether a process lives, as far as the system tells: whoever else has its descriptors, it is gone when it is.
-#[cfg(all(unix, feature = "share"))]
+#[cfg(all(any(unix, windows), feature = "share"))]
 #[derive(Debug)]
 pub(crate) enum Life {
     /// It can be waited for.
@@ -83,7 +124,7 @@ pub(crate) enum Life {
     Unknown,
 }
 
-#[cfg(all(unix, feature = "share"))]
+#[cfg(all(any(unix, windows), feature = "share"))]
 impl Life {
     /// Of `process` as this one counts them; 0 is nobody that this one knows.
     #[cfg(target_os = "linux")]
@@ -105,7 +146,7 @@ impl Life {
     }
 
     /// What is ready to be read once the process is gone, where that can be waited for.
-    pub(crate) fn end(&self) -> Option<std::os::fd::BorrowedFd<'_>> {
+    pub(crate) fn end(&self) -> Option<rustix::fd::BorrowedFd<'_>> {
         match self {
             #[cfg(target_os = "linux")]
             Self::Watched(watched) => Some(std::os::fd::AsFd::as_fd(watched)),

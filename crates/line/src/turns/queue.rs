@@ -1,7 +1,7 @@
 //! Whose turn it is: one owner of the line at a time. Who waits sleeps until it is called; who is called is decided by
 //! [`Order`] at the last moment, so that a stop that comes while the next one wakes up still goes first.
 
-#[cfg(all(unix, feature = "share"))]
+#[cfg(all(any(unix, windows), feature = "share"))]
 mod watching;
 mod work;
 

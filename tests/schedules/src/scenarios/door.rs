@@ -16,7 +16,7 @@ use crate::share::message::{Characters, GREETING, Hello, LET_IN, Order, Told, VE
 use crate::share::place::{Door, Entrance};
 use crate::system::clock;
 use crate::system::process::Life;
-use crate::system::sockets::UnixListener;
+use crate::system::sockets::Listener;
 use crate::turns::order::Priority;
 
 /// A bus with a door.
@@ -29,10 +29,10 @@ struct House {
 
 impl House {
     fn open() -> Self {
-        Self::with(UnixListener::default())
+        Self::with(Listener::default())
     }
 
-    fn with(listener: UnixListener) -> Self {
+    fn with(listener: Listener) -> Self {
         let (bus, sent) = open();
         let door = Door::new(listener);
         let entrances = Arc::clone(&door.entrances);
@@ -183,7 +183,7 @@ pub(super) fn a_program_takes_back() {
 
 /// While the system gives no descriptors, who knocks waits, and is let in then.
 pub(super) fn the_system_refuses_for_a_while() {
-    let house = House::with(UnixListener::refusing(2));
+    let house = House::with(Listener::refusing(2));
     let program = house.program(1, |mut guest| assert!(guest.comes_in() && guest.is_answered(Priority::Write)));
     join([program]);
     assert_eq!(house.door.note(), None, "it gives again");

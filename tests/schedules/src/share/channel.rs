@@ -10,18 +10,20 @@ use serde::de::DeserializeOwned;
 use crate::system::clock::monotonic;
 use crate::system::inherited::Kept;
 use crate::system::process::Life;
-use crate::system::sockets::UnixStream;
+use crate::system::sockets::Stream;
 use crate::system::sync::thread;
 
 #[derive(Debug)]
-pub(crate) struct Channel(Arc<Kept<UnixStream>>);
+pub(crate) struct Channel(Arc<Kept<Stream>>);
 
 impl Channel {
-    pub(crate) fn new(stream: UnixStream, _most: usize, _other: Arc<Life>) -> io::Result<Self> {
+    pub(crate) fn new(stream: Stream, _most: usize, _other: Arc<Life>) -> io::Result<Self> {
         Ok(Self(Arc::new(Kept::new(stream))))
     }
 
     pub(crate) fn depends_on(&mut self, _other: Arc<Life>) {}
+
+    pub(crate) fn lets_say(&mut self, _most: usize) {}
 
     pub(crate) fn say(&mut self, message: &impl Serialize) -> io::Result<()> {
         self.say_bytes(&postcard::to_stdvec(message).map_err(io::Error::other)?)
@@ -61,7 +63,7 @@ impl Channel {
         Self(Arc::clone(&self.0))
     }
 
-    pub(crate) fn end(&self) -> Arc<Kept<UnixStream>> {
+    pub(crate) fn end(&self) -> Arc<Kept<Stream>> {
         Arc::clone(&self.0)
     }
 }

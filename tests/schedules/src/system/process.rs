@@ -1,6 +1,6 @@
 //! One process, in which the programs that come in are threads: each has a number of its own, and lives.
 
-use crate::system::sockets::UnixStream;
+use crate::system::sockets::Stream;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Process;
@@ -30,7 +30,21 @@ pub(crate) struct Peer {
     pub(crate) user: Option<u32>,
 }
 
-pub(crate) fn peer(stream: &UnixStream) -> Peer {
+impl Peer {
+    pub(crate) fn other_user(&self) -> Option<u32> {
+        self.user.filter(|&other| other != user())
+    }
+
+    pub(crate) fn life(&self) -> Life {
+        Life::Unknown
+    }
+}
+
+pub(crate) fn most_files() -> usize {
+    usize::MAX
+}
+
+pub(crate) fn peer(stream: &Stream) -> Peer {
     Peer { process: stream.other(), user: Some(user()) }
 }
 
@@ -40,10 +54,6 @@ pub(crate) enum Life {
 }
 
 impl Life {
-    pub(crate) fn of(_process: u32) -> Self {
-        Self::Unknown
-    }
-
     pub(crate) fn is_gone(&self) -> bool {
         false
     }

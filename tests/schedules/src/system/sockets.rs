@@ -37,14 +37,14 @@ impl End {
 
 /// One end of a connection, which ends when it is dropped.
 #[derive(Debug)]
-pub(crate) struct UnixStream {
+pub(crate) struct Stream {
     wire: Arc<Wire>,
     own: usize,
     /// The number of the program at the other end.
     other: u32,
 }
 
-impl UnixStream {
+impl Stream {
     pub(crate) fn pair() -> io::Result<(Self, Self)> {
         Ok(Self::between(0, 0))
     }
@@ -107,29 +107,26 @@ impl UnixStream {
     }
 }
 
-impl Drop for UnixStream {
+impl Drop for Stream {
     fn drop(&mut self) {
         // One that is over already may be so again.
         let _ = self.shutdown(Shutdown::Both);
     }
 }
 
-/// Where a program knocks from: nobody asks.
-pub(crate) struct Address;
-
 /// Where programs knock.
 #[derive(Debug, Default)]
-pub(crate) struct UnixListener(Mutex<Knocks>);
+pub(crate) struct Listener(Mutex<Knocks>);
 
 #[derive(Debug, Default)]
 struct Knocks {
-    waiting: VecDeque<UnixStream>,
+    waiting: VecDeque<Stream>,
     /// So often the system has no descriptor for who knocks.
     refusals: usize,
     sleepers: Vec<Thread>,
 }
 
-impl UnixListener {
+impl Listener {
     /// So often the system has nothing left to let anybody in with.
     pub(crate) fn refusing(refusals: usize) -> Self {
         Self(Mutex::new(Knocks { refusals, ..Knocks::default() }))
@@ -140,21 +137,21 @@ impl UnixListener {
     }
 
     /// The program with this number knocks.
-    pub(crate) fn connect(&self, number: u32) -> UnixStream {
-        let (own, theirs) = UnixStream::between(number, 0);
+    pub(crate) fn connect(&self, number: u32) -> Stream {
+        let (own, theirs) = Stream::between(number, 0);
         let mut knocks = self.lock();
         knocks.waiting.push_back(theirs);
         knocks.sleepers.drain(..).for_each(|thread| thread.unpark());
         own
     }
 
-    pub(crate) fn accept(&self) -> io::Result<(UnixStream, Address)> {
+    pub(crate) fn accept(&self) -> io::Result<Stream> {
         let mut knocks = self.lock();
         if !knocks.waiting.is_empty() && knocks.refusals > 0 {
             knocks.refusals -= 1;
             return Err(io::Error::other("too many open files"));
         }
-        knocks.waiting.pop_front().map(|stream| (stream, Address)).ok_or_else(|| io::ErrorKind::WouldBlock.into())
+        knocks.waiting.pop_front().ok_or_else(|| io::ErrorKind::WouldBlock.into())
     }
 
     fn is_ready_or_calls(&self) -> bool {
@@ -176,8 +173,8 @@ pub(crate) enum Came {
 
 /// As long as it takes; a wait with an end is over at once.
 pub(crate) fn wait_for_a_knock<'a>(
-    listeners: impl Iterator<Item = &'a UnixListener>,
-    woken: &UnixStream,
+    listeners: impl Iterator<Item = &'a Listener>,
+    woken: &Stream,
     time: Option<Duration>,
 ) -> io::Result<Came> {
     let listeners: Vec<_> = listeners.collect();

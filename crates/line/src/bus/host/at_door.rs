@@ -4,7 +4,7 @@ use std::io;
 use std::time::Duration;
 
 use crate::share::place::{Entrance, ReachedBy};
-use crate::system::sockets::{Came, UnixStream, wait_for_a_knock};
+use crate::system::sockets::{Came, Stream, wait_for_a_knock};
 use crate::system::sync::thread;
 
 /// How long nobody is let in where the system has no more files or threads for that: the first time, and in the end.
@@ -17,9 +17,9 @@ const LONGEST: Duration = Duration::from_secs(1);
 /// Whoever knocks goes on knocking until it is let in. So where that cannot be, nobody is listened to for a while.
 pub(super) fn stand(
     entrances: &[Entrance],
-    woken: &UnixStream,
+    woken: &Stream,
     says: impl Fn(Option<&io::Error>),
-    mut let_in: impl FnMut(UnixStream, ReachedBy) -> io::Result<()>,
+    mut let_in: impl FnMut(Stream, ReachedBy) -> io::Result<()>,
 ) {
     let mut pause = Pause::default();
     loop {
@@ -40,10 +40,10 @@ pub(super) fn stand(
 }
 
 /// Lets in one at each entrance; the error is the system's that has nothing left for it.
-fn accept(entrances: &[Entrance], let_in: &mut impl FnMut(UnixStream, ReachedBy) -> io::Result<()>) -> io::Result<()> {
+fn accept(entrances: &[Entrance], let_in: &mut impl FnMut(Stream, ReachedBy) -> io::Result<()>) -> io::Result<()> {
     for Entrance { listener, reached_by } in entrances {
         match listener.accept() {
-            Ok((stream, _)) => let_in(stream, *reached_by)?,
+            Ok(stream) => let_in(stream, reached_by.clone())?,
             Err(error) => match error.kind() {
                 // Nobody knocks here, or who did has gone.
                 io::ErrorKind::WouldBlock | io::ErrorKind::ConnectionAborted | io::ErrorKind::Interrupted => {}
