@@ -47,7 +47,7 @@
 //! | --- | --- |
 //! | `serial` | serial ports of this machine |
 //! | `tcp` | serial servers (`socket://`) and Modbus TCP (`tcp://`) |
-//! | `share` | ports that programs of one user share, over Unix sockets; elsewhere it changes nothing |
+//! | `share` | ports that programs of one user share |
 //! | `sim` | simulated lines (`sim://`); it needs `builtin-profiles` |
 //! | `builtin-profiles` | the shipped profiles as part of the program |
 //!

@@ -141,7 +141,7 @@ impl BusOptions {
 /// Whether a port is shared with other programs of the same user on this computer.
 ///
 /// The program that has the port does what the others want in its own queue. Serial ports and serial servers
-/// (`socket://`) can be shared, on systems with Unix sockets.
+/// (`socket://`) can be shared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Share {

@@ -1,4 +1,4 @@
-//! Where programs cannot share a port: without the feature `share`, and on systems without Unix sockets.
+//! Where programs cannot share a port: without the feature `share`, and on systems that are neither Unix nor Windows.
 
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex};

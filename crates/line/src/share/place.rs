@@ -189,7 +189,7 @@ impl Place {
     #[cfg(not(unix))]
     pub(crate) fn own(names: Vec<String>, group: Option<u32>) -> io::Result<Vec<Self>> {
         if group.is_some() {
-            let why = "the users of a group meet over a Unix socket, and this system has none";
+            let why = "programs of several users share a port over Unix sockets, which this system has not";
             return Err(io::Error::new(io::ErrorKind::Unsupported, why));
         }
         let folder = of_user()?;

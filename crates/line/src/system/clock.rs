@@ -25,11 +25,16 @@ pub fn monotonic() -> Instant {
     Instant::ZERO + now
 }
 
-/// Now, in nanoseconds since this process first asked.
+/// Now, in nanoseconds since this process first asked; they begin at what the clock on the wall showed then, so that no two
+/// processes begin alike.
 #[cfg(not(unix))]
 pub fn monotonic() -> Instant {
-    static START: std::sync::LazyLock<std::time::Instant> = std::sync::LazyLock::new(std::time::Instant::now);
-    Instant::ZERO + START.elapsed()
+    use std::sync::LazyLock;
+    use std::time::{Instant as Moment, SystemTime, UNIX_EPOCH};
+
+    static START: LazyLock<(Moment, Duration)> =
+        LazyLock::new(|| (Moment::now(), SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()));
+    Instant::ZERO + START.1 + START.0.elapsed()
 }
 
 /// Blocks the thread until `until`, and never wakes it earlier.
