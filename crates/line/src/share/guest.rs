@@ -30,9 +30,9 @@ const LETS_GO: Duration = Duration::from_secs(2);
 /// is still to come: then it hangs. Who wants a stop has less time.
 const SILENT: Duration = Duration::from_secs(2);
 const SILENT_ON_A_STOP: Duration = Duration::from_secs(1);
-/// What is said of somebody on the loopback who has the address of a program that is gone.
+/// What is said of somebody on the loopback who has the address of a program that has the port.
 const STRANGER: &str = "what listens on the loopback where this port was shared is no program of this user's: it does not know \
-    their secret, and was told nothing; the port is shared again as soon as one of them has opened it";
+    their secret, and was told nothing; end it, or end the program that has the port";
 /// How long nothing may be heard of a port that is not opened again, until it is listened on: any time would do.
 const A_LOOK: Duration = Duration::from_secs(3_600);
 
@@ -431,7 +431,8 @@ fn silence(host: &Host, silent: Duration) -> String {
         );
     }
     let end = match process {
-        _ if *is_elsewhere => "end it".to_owned(),
+        // Of 0, `kill` would take it for every program of the terminal.
+        _ if *is_elsewhere || *process == 0 => "end it".to_owned(),
         process if cfg!(windows) => format!("end it (`taskkill /F /PID {process}`)"),
         process => format!("end it (`kill {process}`)"),
     };

@@ -72,8 +72,8 @@ enum Sign {
     /// A socket, and which file it is.
     #[cfg(unix)]
     Socket { path: PathBuf, file: (u64, u64) },
-    /// A file with this secret.
-    Secret { path: PathBuf, secret: Secret },
+    /// A file with this secret, and that file: while it is open, its program is known to live.
+    Secret { path: PathBuf, secret: Secret, _file: Kept<fs::File> },
 }
 
 /// Where programs come in.
@@ -286,7 +286,7 @@ impl Sign {
         match self {
             #[cfg(unix)]
             Self::Socket { path, file } => socket::file_of(path).is_ok_and(|found| found == *file),
-            Self::Secret { path, secret } => loopback::read(path).is_some_and(|(_, found)| found == *secret),
+            Self::Secret { path, secret, .. } => loopback::read(path).is_some_and(|(_, found)| found == *secret),
         }
     }
 }

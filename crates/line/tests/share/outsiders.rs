@@ -1,12 +1,18 @@
 //! Who knocks on the loopback and is no program of this user's, and who stands there in the place of one.
+//! Some stand between two programs: on Unix alone, for elsewhere nobody writes into the file of a program that lives.
 
-use std::fs;
-use std::io::{Read, Write};
-use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
+use std::fs::{self, File, OpenOptions};
+use std::io::{ErrorKind, Read, Write};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::Path;
+use std::sync::LazyLock;
 use std::sync::mpsc::{Receiver, channel};
-use std::sync::{Arc, LazyLock, Mutex};
 use std::thread;
+#[cfg(unix)]
+use std::{
+    net::Shutdown,
+    sync::{Arc, Mutex},
+};
 
 use drivebus_line::Share;
 
@@ -101,6 +107,7 @@ fn who_does_not_know_the_secret_is_cut_off_however_its_bytes_are_cut() {
 }
 
 /// Carries what comes on, and keeps each message.
+#[cfg(unix)]
 fn carry(mut from: TcpStream, mut to: TcpStream, kept: &Mutex<Vec<Vec<u8>>>) {
     let mut length = [0; 4];
     while from.read_exact(&mut length).is_ok() {
@@ -115,6 +122,7 @@ fn carry(mut from: TcpStream, mut to: TcpStream, kept: &Mutex<Vec<Vec<u8>>>) {
 }
 
 /// Stands between the program that has the port and those who knock there from now on; what the first of them says is kept.
+#[cfg(unix)]
 fn stand_between(folder: &Path) -> Arc<Mutex<Vec<Vec<u8>>>> {
     let (port, secret) = address(folder);
     let between = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
@@ -134,6 +142,7 @@ fn stand_between(folder: &Path) -> Arc<Mutex<Vec<Vec<u8>>>> {
     said
 }
 
+#[cfg(unix)]
 #[test]
 fn a_proof_that_was_heard_is_good_for_no_other_connection() {
     on_loopback("outsiders::a_proof_that_was_heard_is_good_for_no_other_connection", |folder| {
@@ -175,12 +184,32 @@ fn a_thousand_who_knock_hold_up_nobody() {
     });
 }
 
+/// A file that is kept open, as by a program that has the port.
+fn kept(path: &Path) -> File {
+    // Another one may stand there, which its program keeps.
+    let _ = fs::remove_file(path);
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(windows)]
+    std::os::windows::fs::OpenOptionsExt::share_mode(&mut options, 1 | 4);
+    let file = options.open(path).unwrap();
+    #[cfg(unix)]
+    rustix::fs::flock(&file, rustix::fs::FlockOperation::LockExclusive).unwrap();
+    file
+}
+
+/// Somebody who listens in the place of a program that has the port.
+struct Impostor {
+    told: Receiver<Vec<u8>>,
+    _file: File,
+}
+
 /// Listens where the file says, and keeps what is said there; answers each with `answer`.
-fn impostor(folder: &Path, answer: &'static [u8]) -> Receiver<Vec<u8>> {
+fn impostor(folder: &Path, answer: &'static [u8]) -> Impostor {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let there = listener.local_addr().unwrap().port();
-    let file = folder.join("drivebus").join(files(folder, "lock")[0].with_extension("tcp"));
-    fs::write(file, format!("drivebus loopback 1 {there} {}", "5a".repeat(32))).unwrap();
+    let mut file = kept(&files(folder, "lock")[0].with_extension("tcp"));
+    file.write_all(format!("drivebus loopback 1 {there} {}", "5a".repeat(32)).as_bytes()).unwrap();
     let (tell, told) = channel();
     thread::spawn(move || {
         for stream in listener.incoming() {
@@ -193,24 +222,39 @@ fn impostor(folder: &Path, answer: &'static [u8]) -> Receiver<Vec<u8>> {
             tell.send(said).unwrap();
         }
     });
-    told
+    Impostor { told, _file: file }
 }
 
 #[test]
-fn who_stands_in_the_place_of_a_program_that_is_gone_learns_nothing() {
-    on_loopback("outsiders::who_stands_in_the_place_of_a_program_that_is_gone_learns_nothing", |folder| {
+fn who_stands_in_the_place_of_a_program_learns_nothing() {
+    on_loopback("outsiders::who_stands_in_the_place_of_a_program_learns_nothing", |folder| {
         open().close();
         for answer in [wrong_code(), &[0xFF; 80], b"HTTP/1.1 400 Bad Request\r\n\r\n", &[0; 4]] {
-            let told = impostor(folder, answer);
+            let impostor = impostor(folder, answer);
             // Nobody has the port: it is opened, and the impostor's file is replaced.
             let bus = open();
             assert_eq!(read(&bus, 1).unwrap(), 1);
-            let said = told.recv().unwrap();
+            let said = impostor.told.recv().unwrap();
             assert_eq!(said.len(), 4 + OPENING.len() + 32, "how it begins, and a nonce");
             assert_eq!(said[4..4 + OPENING.len()], *OPENING);
             assert_eq!(read(&open(), 2).unwrap(), 2, "others find the one that has it");
             bus.close();
         }
+    });
+}
+
+#[test]
+fn a_file_that_was_left_behind_is_followed_by_nobody() {
+    on_loopback("outsiders::a_file_that_was_left_behind_is_followed_by_nobody", |folder| {
+        open().close();
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+        let there = listener.local_addr().unwrap().port();
+        let file = files(folder, "lock")[0].with_extension("tcp");
+        fs::write(&file, format!("drivebus loopback 1 {there} {}", "5a".repeat(32))).unwrap();
+        let (owner, guest) = (open(), open());
+        assert_eq!((read(&owner, 1).unwrap(), read(&guest, 2).unwrap()), (1, 2));
+        listener.set_nonblocking(true).unwrap();
+        assert_eq!(listener.accept().unwrap_err().kind(), ErrorKind::WouldBlock, "nobody knocked there");
     });
 }
 
@@ -224,15 +268,16 @@ fn wrong_code() -> &'static [u8] {
 fn who_stands_in_the_place_of_a_program_that_has_the_port_is_told_of() {
     on_loopback("outsiders::who_stands_in_the_place_of_a_program_that_has_the_port_is_told_of", |folder| {
         let owner = open_as(options().share(Share::Own)).unwrap();
-        let told = impostor(folder, wrong_code());
+        let impostor = impostor(folder, wrong_code());
         let error = open_as(options()).unwrap_err().to_string();
         assert!(error.contains("is no program of this user's: it does not know their secret"), "{error}");
-        assert_eq!(told.recv().unwrap().len(), 4 + OPENING.len() + 32);
+        assert_eq!(impostor.told.recv().unwrap().len(), 4 + OPENING.len() + 32);
         assert_eq!(read(&owner, 1).unwrap(), 1);
     });
 }
 
 /// The greeting comes behind the proof, and says the version as it always did.
+#[cfg(unix)]
 #[test]
 fn a_program_of_another_version_is_told_so() {
     on_loopback("outsiders::a_program_of_another_version_is_told_so", |folder| {

@@ -1,10 +1,12 @@
-//! The files of a port in its folder: nobody else than who meets there reads or writes them. One of them is a lock.
+//! The files of a port in its folder: nobody else than who meets there reads or writes them. One of them is a lock, and one is
+//! kept by the program that wrote it, for as long as that lives.
 
 use std::fs::{File, OpenOptions};
 use std::io;
 
+pub(super) use of_this_system::is_kept;
+
 use super::Place;
-#[cfg(unix)]
 use crate::system::inherited::Kept;
 
 /// The lock of a port: a program at a time has it, until it is dropped, or the program is gone.
@@ -23,6 +25,7 @@ pub(super) struct Lock {
 mod of_this_system {
     use std::fs::Permissions;
     use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
+    use std::path::Path;
 
     use rustix::fs::{FlockOperation, OFlags, flock};
 
@@ -48,9 +51,11 @@ mod of_this_system {
             Ok(file)
         }
 
-        /// The file of this port with such an ending, made anew.
-        pub(in crate::share::place) fn new_file(&self, ending: &str) -> io::Result<File> {
-            self.file(ending, true)
+        /// The file of this port with such an ending, made anew, and [kept](is_kept) by this program.
+        pub(in crate::share::place) fn kept_file(&self, ending: &str) -> io::Result<Kept<File>> {
+            let file = Kept::opened(|| self.file(ending, true))?;
+            flock(&*file, FlockOperation::NonBlockingLockExclusive)?;
+            Ok(file)
         }
 
         /// The lock, not taken yet; `None` where this user may not have it.
@@ -62,6 +67,12 @@ mod of_this_system {
                 Err(error) => Err(error),
             }
         }
+    }
+
+    /// Whether the program lives that keeps the file at `path`, and has it open.
+    pub(in crate::share::place) fn is_kept(path: &Path) -> bool {
+        // Those who look do not keep each other out.
+        File::open(path).is_ok_and(|file| flock(file, FlockOperation::NonBlockingLockShared).is_err())
     }
 
     impl Lock {
@@ -77,16 +88,22 @@ mod of_this_system {
     use std::os::windows::fs::OpenOptionsExt;
     use std::path::Path;
 
-    use super::{File, Lock, OpenOptions, Place, io};
+    use super::{File, Kept, Lock, OpenOptions, Place, io};
 
     /// What the system says of a file that another program keeps for itself. Source: *System Error Codes*,
     /// `ERROR_SHARING_VIOLATION`.
     const KEPT_BY_ANOTHER: i32 = 32;
+    /// What others may do with a file that is open. Source: `CreateFileW`, `FILE_SHARE_READ` and `FILE_SHARE_DELETE`.
+    const SHARE_READ: u32 = 1;
+    const SHARE_DELETE: u32 = 4;
 
     impl Place {
-        /// The file of this port with such an ending, made anew.
-        pub(in crate::share::place) fn new_file(&self, ending: &str) -> io::Result<File> {
-            OpenOptions::new().write(true).create_new(true).open(self.path(ending))
+        /// The file of this port with such an ending, made anew, and [kept](is_kept) by this program: others may read it,
+        /// and put another one in its place.
+        pub(in crate::share::place) fn kept_file(&self, ending: &str) -> io::Result<Kept<File>> {
+            let mut options = OpenOptions::new();
+            options.write(true).create_new(true).share_mode(SHARE_READ | SHARE_DELETE);
+            options.open(self.path(ending)).map(Kept::new)
         }
 
         /// The lock, not taken yet.
@@ -94,6 +111,12 @@ mod of_this_system {
             let path = self.path("lock");
             Ok(Some(Lock { file: alone(&path)?, path }))
         }
+    }
+
+    /// Whether the program lives that keeps the file at `path`, and has it open.
+    pub(in crate::share::place) fn is_kept(path: &Path) -> bool {
+        let opened = OpenOptions::new().write(true).open(path);
+        opened.is_err_and(|error| error.raw_os_error() == Some(KEPT_BY_ANOTHER))
     }
 
     impl Lock {

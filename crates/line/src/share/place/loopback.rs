@@ -2,8 +2,9 @@
 //! its guests know each other.
 //!
 //! It is one line of text, made anew by each program that has the port: [`FORM`], the TCP port, and the secret as two digits a
-//! byte. It is removed when that program gives the port up. A program that was killed leaves it, and with it an address at
-//! which nobody listens, or somebody else: who that is, cannot know the secret.
+//! byte. That program keeps the file open, and removes it when it gives the port up. If it was killed, the file is left, and with
+//! it an address at which nobody listens, or somebody else. It is seen that nobody has the file open, and who listens there
+//! cannot know the secret.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read as _, Write as _};
@@ -14,6 +15,7 @@ use std::time::Duration;
 
 use drivebus_rtu::Instant;
 
+use super::files::is_kept;
 use super::{Door, Entrance, Nobody, Place, Reached, ReachedBy, STEP, Sign};
 use crate::share::secret::Secret;
 use crate::system::clock::monotonic;
@@ -26,7 +28,7 @@ const FORM: &str = "drivebus loopback 1";
 const MOST: u64 = 128;
 /// What its name ends in while it is written.
 const DRAFT: &str = "tcp-draft";
-/// How long a connection within this machine may take. Windows goes on trying for longer where nobody listens.
+/// How long a connection within this machine may take. Where nobody listens, Windows goes on trying for longer.
 const CONNECTS: Duration = Duration::from_secs(1);
 
 impl Place {
@@ -41,13 +43,12 @@ impl Place {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
             _ => {}
         }
-        let mut file = self.new_file(DRAFT)?;
+        let mut file = self.kept_file(DRAFT)?;
         file.write_all(format!("{FORM} {port} {}\n", secret.written()).as_bytes())?;
-        drop(file);
         fs::rename(&draft, &path)?;
         let listener = Kept::new(Listener::Tcp(listener));
         let entrance = Entrance { listener, reached_by: ReachedBy::Strangers(secret.clone()) };
-        Ok(Door::new(std::iter::once(entrance), Sign::Secret { path, secret }))
+        Ok(Door::new(std::iter::once(entrance), Sign::Secret { path, secret, _file: file }))
     }
 
     /// Connects to the program that serves the port; by `until` where many knock.
@@ -57,6 +58,10 @@ impl Place {
             let Some((port, secret)) = read(&path) else {
                 return Err(if path.exists() { Nobody::Gone } else { Nobody::Absent });
             };
+            // Whoever listens there now, is not the program that wrote it.
+            if !is_kept(&path) {
+                return Err(Nobody::Gone);
+            }
             match connect(port) {
                 Err(Nobody::Crowded) if monotonic() < until => thread::sleep(STEP),
                 found => return found.map(|stream| Reached { stream, secret: Some(secret) }),
@@ -165,19 +170,16 @@ mod tests {
         assert!(matches!(place.knock(soon()), Err(Nobody::Absent)));
         let door = place.open_door().unwrap();
         let left = fs::read(place.path("tcp")).unwrap();
-        drop(door);
+        // Somebody listens there all the same: nobody who lives has the file open.
+        fs::remove_file(place.path("tcp")).unwrap();
         let shorter = left.len() - 2;
-        for file in [
-            &left[..],
-            &left[..shorter],
-            b"",
-            b"drivebus loopback 2 1 00",
-            b"\xFF\xFE",
-            &[left.clone(), left.clone()].concat(),
-        ] {
+        let twice = [left.clone(), left.clone()].concat();
+        for file in [&left[..], &left[..shorter], b"", b"drivebus loopback 2 1 00", b"\xFF\xFE", &twice] {
             fs::write(place.path("tcp"), file).unwrap();
             assert!(matches!(place.knock(soon()), Err(Nobody::Gone)));
         }
+        drop(door);
+        assert_eq!(room.files(), ["port-1.tcp"], "it is not that door's any more");
         let door = place.open_door().unwrap();
         assert!(place.has(&door) && place.knock(soon()).is_ok());
     }
