@@ -164,6 +164,28 @@ def test_who_only_watches_moves_nothing(tmp_path: Path) -> None:
         assert all(each["values"] or each["quality"] == "gone" for each in ear.at(f"{HERE}/pump/state"))
 
 
+def test_what_the_broker_does_not_take_waits(tmp_path: Path) -> None:
+    """It is told, and it comes when the broker takes it."""
+    heard: list[str] = []
+    with Simulator({1: "gd350", 2: "vfd500"}, transport="tcp", baudrate=115200) as simulator, strict(tmp_path) as at:
+        (tmp_path / "acl").write_text(RULES.replace("hall 1/#", "hall 1/pump/#"))
+        at.kill()
+        at.start()
+        ear = Somebody(at, as_watcher(tmp_path))
+        try:
+            with served(plant(tmp_path, simulator.port, at), heard) as service:
+                seen(lambda: any("refuses drivebus/hall 1/history: not authorized" in text for text in heard))
+                assert service.status()["outlets"]["mqtt"]["delivered"] == 0
+                at.kill()
+                (tmp_path / "acl").write_text(RULES)
+                at.start()
+                seen(lambda: ear.hears)
+                seen(lambda: service.status()["outlets"]["mqtt"]["delivered"] > 20)
+        finally:
+            ear.close()
+        assert ear.at(f"{HERE}/history")[0][0]["seq"] < 5
+
+
 def test_a_password_that_others_may_read_is_not_used(tmp_path: Path) -> None:
     with strict(tmp_path) as at:
         file = plant(tmp_path, "sim://gd350", at)

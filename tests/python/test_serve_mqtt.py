@@ -15,6 +15,7 @@ import pytest
 from drivebus import Simulator
 from drivebus.errors import NotAllowed
 from drivebus.service import Service, check
+from drivebus.sinks import Commander, Mqtt, MqttSettings, Picture
 from drivebus.site import Site
 from drivebus.spool import Spool
 
@@ -162,6 +163,7 @@ SERVES = """
 import sys
 from pathlib import Path
 from drivebus.service import Service
+from drivebus.sinks import Commander, Mqtt, MqttSettings, Picture
 from drivebus.site import Site
 Service(Site.load(Path(sys.argv[1])), print).run()
 """
@@ -265,9 +267,9 @@ def told_of(folder: Path, plant: str, said: str) -> None:
 
 def test_without_the_library_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "paho.mqtt.client", None)
-    for module in ("mqtt_client", "mqtt_link"):
-        monkeypatch.delitem(sys.modules, f"drivebus.sinks.{module}", raising=False)
-        monkeypatch.delattr(f"drivebus.sinks.{module}", raising=False)
+    for name in ("drivebus.sinks.mqtt_link", "drivebus.sinks.mqtt_client"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+        monkeypatch.delattr(name, raising=False)
     told_of(tmp_path, PLANT, "pip install 'drivebus[mqtt]'")
 
 
@@ -284,3 +286,23 @@ def test_the_way_is_encrypted_unless_the_file_says_otherwise(tmp_path: Path) -> 
         told = Site.load(file).mqtt
         assert told is not None
         assert (told.broker.tls, told.broker.port) == expected
+
+
+def test_what_goes_wrong_is_told_and_the_watch_goes_on(tmp_path: Path) -> None:
+    heard: list[str] = []
+    silences: list[float] = []
+
+    def look() -> Picture:
+        raise ValueError("nobody thought of this")
+
+    commander = Commander(lambda _, __: None, lambda _, __: None, lambda: False, silences.append)
+    with broker(tmp_path) as at:
+        mqtt = Mqtt(MqttSettings("127.0.0.1", at.port, "g", tls=False), [], look, None, commander, heard.append)
+        mqtt.start()
+        seen(lambda: any("could not be said" in text and "nobody thought of this" in text for text in heard))
+        before = len(silences)
+        seen(lambda: len(silences) > before)
+        assert mqtt.status() == {"connected": True, "why": "", "behind": 0, "delivered": 0}
+        mqtt.close()
+        mqtt.close()
+    assert len([text for text in heard if "nobody thought" in text]) == 1

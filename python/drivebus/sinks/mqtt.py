@@ -10,7 +10,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drivebus import checks
@@ -36,6 +35,8 @@ __all__ = ["Answer", "Commander", "Mqtt"]
 
 _LOOKS = 0.2
 """Seconds between two looks at how the plant is."""
+_SETTLES = 2.0
+"""Seconds after which Home Assistant has dropped what it was told to drop."""
 _WAITING = 10_000
 """Messages that wait for the broker to take them; what comes then is not said."""
 _LONGEST = 500
@@ -106,17 +107,22 @@ class Mqtt:
         self._clock = clock
         self._wall = wall
         self._commands = Commands()
+        self._tell = tell
+        self._told = ""
         self._present = Present(drives, self._topics)
         self._shown = _shown(drives, settings)
         self._waiting: deque[Message] = deque()
         self._announcing: deque[Message] = deque()
+        self._ending: deque[Message] = deque()
+        self._greeted = clock()
+        self._looked = -_LOOKS
         self._is_born = False
         self._number = 0
         self._beaten = clock()
         self._wake = threading.Event()
         self._closing = threading.Event()
         farewell = Message(self._topics.availability, OFFLINE, keeps=True)
-        self._link = _paho("mqtt_link").Link(settings, farewell, self._hear, tell, self._wake.set, clock)
+        self._link = _paho().Link(settings, farewell, self._hear, tell, self._wake.set, clock)
         self._delivery: Delivery | None = None
         if spool is not None:
             self._delivery = Delivery(spool, SINK, History(spool, self._link, self._topics), tell)
@@ -129,7 +135,10 @@ class Mqtt:
         Raises:
             NotAllowed: They cannot, or paho-mqtt is not installed.
         """
-        _paho("mqtt_client").checked(settings)
+        _paho()
+        from drivebus.sinks.mqtt_client import checked
+
+        checked(settings)
 
     def start(self) -> None:
         """Begins to connect, and to speak."""
@@ -158,10 +167,18 @@ class Mqtt:
         while not self._closing.is_set():
             self._wake.wait(_LOOKS)
             self._wake.clear()
-            if not self._link.why:
-                self._speak()
+            try:
+                if not self._link.why:
+                    self._speak()
+            except Exception as error:  # whatever it is, a motor that depends on the broker is watched over
+                self._fail(str(error) or type(error).__name__)
             if self._commander is not None:
                 self._commander.silent(self._clock() - self._link.heard)
+
+    def _fail(self, why: str) -> None:
+        if why != self._told:
+            self._told = why
+            self._tell(f"something could not be said to {self._link.name}: {why}")
 
     def _speak(self) -> None:
         if self._link.number != self._number:
@@ -171,8 +188,12 @@ class Mqtt:
             self._is_born = False
             self._announcing = deque(self._shown.values())
         self._beat()
-        if self._drained(self._waiting) and self._drained(self._announcing):
-            now = self._clock()
+        now = self._clock()
+        if now - self._greeted > _SETTLES:
+            self._drained(self._ending)
+        # It is woken by each acknowledgement, and a look at the plant asks all its lines.
+        if self._drained(self._waiting) and self._drained(self._announcing) and now - self._looked >= _LOOKS:
+            self._looked = now
             for due in self._present.due(self._look(), now):
                 if not all(self._link.post(message) for message in due.messages):
                     return
@@ -193,11 +214,12 @@ class Mqtt:
         self._waiting.clear()
         self._waiting.append(Message(self._topics.availability, ONLINE, keeps=True))
         self._announcing = deque(self._shown.values())
+        self._ending.clear()
+        self._greeted = self._clock()
         self._present.forget()
         topics: list[str] = []
         if prefix := self._settings.home_assistant:
             topics += [home_assistant.born(prefix), home_assistant.filter_of(prefix, self._topics)]
-        # Behind the former: what an entity listens to goes when the entity is gone.
         topics += self._topics.kept
         if self._commander is not None:
             topics.append(self._topics.commands)
@@ -225,7 +247,9 @@ class Mqtt:
             or (place is None and _is_config(came.topic) and came.topic not in self._shown)
         ):
             # Of a drive, or a value of one, that the file does not have any more.
-            self._say(Message(came.topic, b"", keeps=True))
+            # What an entity listens to goes when the entity is gone.
+            waiting = self._waiting if place is None else self._ending
+            self._say(Message(came.topic, b"", keeps=True), waiting)
         self._wake.set()
 
     def _command(self, heard: Heard, came: Incoming) -> None:
@@ -254,9 +278,10 @@ class Mqtt:
         if came.answer_to and self._may_answer(came.answer_to):
             self._say(Message(came.answer_to, packed(told), to=came.known_by))
 
-    def _say(self, message: Message) -> None:
-        if len(self._waiting) < _WAITING:
-            self._waiting.append(message)
+    def _say(self, message: Message, waiting: deque[Message] | None = None) -> None:
+        waiting = self._waiting if waiting is None else waiting
+        if len(waiting) < _WAITING:
+            waiting.append(message)
         self._wake.set()
 
     def _may_answer(self, topic: str) -> bool:
@@ -281,9 +306,10 @@ def _shown(drives: Sequence[MqttDrive], settings: MqttSettings) -> dict[str, Mes
     }
 
 
-def _paho(name: str) -> ModuleType:
-    """The module called *name*, which needs paho-mqtt."""
+def _paho() -> ModuleType:
+    """What needs paho-mqtt."""
     try:
-        return import_module(f"drivebus.sinks.{name}")
+        from drivebus.sinks import mqtt_link
     except ImportError:
         raise NotAllowed("MQTT needs paho-mqtt: pip install 'drivebus[mqtt]'") from None
+    return mqtt_link

@@ -1,4 +1,4 @@
-"""A client of an MQTT broker, made as settings say: encrypted and verified, with a name and a password."""
+"""A client of paho-mqtt as it is used here: it believes nobody without a certificate, and says when it has ended."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from typing import Any
 
 import paho.mqtt.client as paho
 from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
+from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
 
 from drivebus.errors import NotAllowed
 from drivebus.sinks.mqtt_settings import MqttSettings
 from drivebus.sinks.password_file import password_in
 
-__all__ = ["CONNECTS", "Client", "checked", "cut", "new_client", "reason_of"]
+__all__ = ["CONNECTS", "Client", "checked", "cut", "in_words", "new_client", "properties_of", "reason_of"]
 
 CONNECTS = 10.0
 """Seconds for a connection."""
@@ -57,6 +59,22 @@ def new_client(settings: MqttSettings, ended: Callable[[str], None], name: str, 
     return client
 
 
+class _Wire(ssl.SSLSocket):
+    """A socket that is closed when the other side is not who it should be: the client leaves it open."""
+
+    def do_handshake(self, block: bool = False) -> None:
+        """Learns who the other side is.
+
+        Raises:
+            OSError: It is not who it should be, or does not say.
+        """
+        try:
+            super().do_handshake(block)
+        except BaseException:
+            self.close()
+            raise
+
+
 class Client(paho.Client):
     """A client that says when nobody serves it any more, whatever ended that.
 
@@ -80,22 +98,6 @@ class Client(paho.Client):
             self._say_ended(why)
 
 
-class _Wire(ssl.SSLSocket):
-    """A socket that is closed when the other side is not who it should be: the client leaves it open."""
-
-    def do_handshake(self, block: bool = False) -> None:
-        """Learns who the other side is.
-
-        Raises:
-            OSError: It is not who it should be, or does not say.
-        """
-        try:
-            super().do_handshake(block)
-        except BaseException:
-            self.close()
-            raise
-
-
 def cut(client: paho.Client) -> None:
     """Whatever the client waits for is over."""
     wire = client.socket()
@@ -105,10 +107,22 @@ def cut(client: paho.Client) -> None:
             socket.socket.shutdown(wire, socket.SHUT_RDWR)
 
 
+def properties_of(kind: int) -> Properties:
+    """Those of a packet of a *kind* of `PacketTypes`, empty."""
+    made: Callable[[int], Properties] = Properties  # the library has no types for it
+    return made(kind)
+
+
 def reason_of(error: Exception) -> str:
-    """Why something cannot be reached, in words."""
+    """Why somebody cannot be reached, or a file cannot be read, in words."""
     if isinstance(error, ssl.SSLCertVerificationError):
         return f"its certificate is not trusted: {error.verify_message}"
     if isinstance(error, OSError):
         return error.strerror or str(error) or type(error).__name__
     return str(error)
+
+
+def in_words(code: ReasonCode) -> str:
+    """What the broker, or the client itself, says; in small letters, as all that is told."""
+    told = str(code)
+    return told[:1].lower() + told[1:]

@@ -13,14 +13,13 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 import paho.mqtt.client as paho
-from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 from paho.mqtt.subscribeoptions import SubscribeOptions
 
 from drivebus.errors import NotAllowed
-from drivebus.sinks.mqtt_client import CONNECTS, checked, cut, new_client, reason_of
+from drivebus.sinks.mqtt_client import CONNECTS, checked, cut, in_words, new_client, properties_of, reason_of
 from drivebus.sinks.mqtt_messages import Message
 from drivebus.sinks.mqtt_settings import MqttSettings
 
@@ -189,11 +188,11 @@ class Link:
     def _publish(self, client: paho.Client, message: Message) -> bool:
         properties = None
         if message.to is not None:
-            properties = _properties(PacketTypes.PUBLISH)
+            properties = properties_of(PacketTypes.PUBLISH)
             properties.CorrelationData = message.to
         # Not with the lock: the client calls back with a lock of its own.
         sent = client.publish(message.topic, message.payload, qos=1, retain=message.keeps, properties=properties)
-        if sent.rc != MQTTErrorCode.MQTT_ERR_SUCCESS:
+        if sent.rc != paho.MQTT_ERR_SUCCESS:
             return False
         with self._lock:
             if sent.mid not in self._early:
@@ -241,7 +240,7 @@ class Link:
         settings = self._settings
         try:
             client = self._new_client()
-            told = _properties(PacketTypes.CONNECT)
+            told = properties_of(PacketTypes.CONNECT)
             told.SessionExpiryInterval = 0
             told.MaximumPacketSize = _LARGEST
             client.connect(settings.host, settings.port, _KEEPALIVE, clean_start=True, properties=told)
@@ -259,8 +258,8 @@ class Link:
             self._ended.wait()
         if self._closing.is_set():
             # The broker says the last will then, as if this was gone without a word.
-            client.disconnect(reasoncode=ReasonCode(PacketTypes.DISCONNECT, identifier=4))
             self._ended.clear()
+            client.disconnect(reasoncode=ReasonCode(PacketTypes.DISCONNECT, identifier=4))
             self._ended.wait(_GRACE)
         cut(client)
         client.loop_stop()
@@ -285,7 +284,7 @@ class Link:
 
     def _on_connect(self, _: Any, __: Any, ___: Any, code: ReasonCode, told: Properties | None) -> None:
         if code.is_failure:
-            self._ending = _in_words(code)
+            self._ending = in_words(code)
             self._ended.set()
             return
         with self._lock:
@@ -304,7 +303,7 @@ class Link:
         self._changed()
 
     def _on_disconnect(self, _: Any, __: Any, ___: Any, code: ReasonCode, ____: Any) -> None:
-        self._ending = self._ending or _in_words(code)
+        self._ending = self._ending or in_words(code)
         with self._lock:
             if not self.why:
                 self._is_over(self._ending)
@@ -312,7 +311,7 @@ class Link:
         self._changed()
 
     def _on_publish(self, _: Any, __: Any, mid: int, code: ReasonCode, ___: Any) -> None:
-        refusal = _in_words(code) if code.value >= _FAILED else ""
+        refusal = in_words(code) if code.value >= _FAILED else ""
         with self._lock:
             self.heard = self._clock()
             if mid in self._under_way:
@@ -325,7 +324,7 @@ class Link:
     def _on_subscribe(self, _: Any, __: Any, ___: Any, codes: Sequence[ReasonCode], ____: Any) -> None:
         for code in codes:
             if code.value >= _FAILED:
-                self._complain(f"{self.name} does not let this hear something: {_in_words(code)}")
+                self._complain(f"{self.name} does not let this hear something: {in_words(code)}")
 
     def _on_message(self, _: Any, __: Any, message: paho.MQTTMessage) -> None:
         self.heard = self._clock()
@@ -342,14 +341,3 @@ class Link:
                     getattr(told, "CorrelationData", None),
                 )
             )
-
-
-def _properties(of: int) -> Properties:
-    made: Callable[[int], Properties] = Properties  # the library has no types for it
-    return made(of)
-
-
-def _in_words(code: ReasonCode) -> str:
-    """What the broker, or the client itself, says; in small letters, as all that is told."""
-    told = str(code)
-    return told[:1].lower() + told[1:]

@@ -19,7 +19,7 @@ from paho.mqtt.enums import MQTTErrorCode
 
 from drivebus.errors import NotAllowed
 from drivebus.sinks.intervals import Intervals
-from drivebus.sinks.mqtt_client import Client, cut, new_client, reason_of
+from drivebus.sinks.mqtt_client import Client, cut, in_words, new_client, reason_of
 from drivebus.sinks.picture import Picture
 from drivebus.sinks.reached import Reached
 from drivebus.sinks.sparkplug_node import NAMESPACE, Message, Node, wants_rebirth
@@ -185,13 +185,13 @@ class Session:
     def _on_connect(self, _: Any, __: Any, ___: Any, code: Any, ____: Any) -> None:
         with self._changed:
             if code.is_failure:
-                self._why = str(code)
+                self._why = in_words(code)
             self._is_up = True
             self._changed.notify_all()
 
     def _on_subscribe(self, _: Any, __: Any, number: int, codes: Sequence[Any], ____: Any) -> None:
         with self._changed:
-            refused = [str(code) for code in codes if code.is_failure]
+            refused = [in_words(code) for code in codes if code.is_failure]
             if refused:
                 self._why = f"it does not let this node hear commands: {refused[0]}"
             self._answered.add(number)
