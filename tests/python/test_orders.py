@@ -35,6 +35,10 @@ line = "hall"
 unit = 3
 profile = "gd350"
 read_only = true
+[drives.ghost]
+line = "hall"
+unit = 9
+profile = "gd350"
 """
 ALL = frozenset(ORDERS)
 DOOR = Door("page", {"pump": ALL, "fan": ALL, "meter": ALL})
@@ -171,6 +175,22 @@ def test_all_are_stopped_side_by_side(plant: Plant) -> None:
             "meter": "not sent",
         }
         assert plant.told()[-1] == plant.told(2)[-1] == STOP
+
+
+def test_a_silent_drive_keeps_nobody_waiting(plant: Plant) -> None:
+    """It is told on, and who presses once more is told so."""
+    door = Door("page", {"pump": ALL, "ghost": ALL})
+    with plant.line():
+        told = plant.orders.stop_all(door, "maria", within=0.0)
+        assert told["ghost"].result == "may have been done"
+        seen(lambda: plant.told()[-1:] == [STOP])
+        plant.orders.stop_all(door, "maria", within=0.0)
+
+        def presses_again() -> bool:
+            return "is being told already" in plant.orders.give(door, Order("ghost", "stop"), "maria", SOON).text
+
+        seen(presses_again)
+        seen(lambda: plant.orders.give(door, Order("pump", "stop"), "maria", SOON).result == "done")
 
 
 def test_what_a_door_set_in_motion_is_halted_with_it(plant: Plant) -> None:

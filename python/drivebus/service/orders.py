@@ -27,6 +27,9 @@ ORDERS = ("run", "setpoint", "reset", "stop", "coast")
 HALTS = ("stop", "coast")
 """Those that halt: whoever may tell a drive anything may tell it this, and it goes before all else."""
 
+_AT_ONCE = 2
+"""So many halts of one drive are under way at a time. A drive that is silent is told for seconds, before all others on
+its line, and people press on."""
 _TRIES_AGAIN = 1.0
 """Seconds until a motor is halted again that did not take it, when its door is shut."""
 
@@ -91,6 +94,7 @@ class _Charge:
     drive: Drive
     motor: Motor
     lock: threading.Lock = field(default_factory=threading.Lock)
+    halts: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(_AT_ONCE))
     door: str = ""
     """Whose door it was set in motion by."""
 
@@ -130,19 +134,26 @@ class Orders:
         self._events.note(order.drive, "order", f"{who} by {door.name}: {_in_words(order)}: {_told(outcome)}")
         return outcome
 
-    def stop_all(self, door: Door, who: str) -> dict[str, Outcome]:
-        """Stops every drive that may be stopped at *door*, side by side."""
-        found: dict[str, Outcome] = {}
+    def stop_all(self, door: Door, who: str, within: float | None = None) -> dict[str, Outcome]:
+        """Stops every drive that may be stopped at *door*, side by side.
+
+        What became of it is told after *within* seconds at the latest, if that is given. Those that did not answer are
+        told on, and an event says what became of that.
+        """
+        names = [name for name, allowed in door.may.items() if allowed]
+        slow = Outcome("may have been done", "it is told again and again, and has not answered yet")
+        found = dict.fromkeys(names, slow)
 
         def stop(name: str) -> None:
             found[name] = self.give(door, Order(name, "stop"), who, self._clock())
 
-        threads = [threading.Thread(target=stop, args=(name,)) for name, allowed in door.may.items() if allowed]
+        threads = [threading.Thread(target=stop, args=(name,), daemon=True) for name in names]
         for thread in threads:
             thread.start()
+        end = None if within is None else time.monotonic() + within
         for thread in threads:
-            thread.join()
-        return found
+            thread.join(None if end is None else max(end - time.monotonic(), 0.0))
+        return dict(found)
 
     def started_by(self, door: str) -> list[str]:
         """The drives that were set in motion by *door*, and not halted since."""
@@ -181,7 +192,10 @@ class Orders:
             return Outcome("not sent", self._why_away(order.drive))
         try:
             if order.what in HALTS:
-                self._halt(charge, order.what)
+                with _if_free(charge.halts) as is_free:
+                    if not is_free:
+                        return Outcome("may have been done", "it is being told already, and has not answered yet")
+                    self._halt(charge, order.what)
             else:
                 with charge.lock:
                     self._in_time(charge, until)
@@ -235,7 +249,7 @@ class Orders:
 
 
 @contextmanager
-def _if_free(lock: threading.Lock) -> Iterator[bool]:
+def _if_free(lock: threading.Lock | threading.Semaphore) -> Iterator[bool]:
     taken = lock.acquire(blocking=False)
     try:
         yield taken
