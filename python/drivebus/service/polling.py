@@ -85,7 +85,7 @@ class Polling:
         kind = "" if sample.missing is None else type(sample.missing).__name__
         values = [] if missing else [sample[name] for name in of.layout.names]
         doing, fault = ("", "") if missing else of.read_off(sample)
-        said = DrivePicture(place, of.layout, sample.time, missing, tuple(values), doing, fault)
+        said = DrivePicture(place, of.layout, sample.time, missing, tuple(values), doing, fault, of.interval)
         with self._lock:
             self._last[place, of.layout.drive] = said
         self._events.saw(said)
@@ -102,6 +102,7 @@ class _Series:
         self.layout = layout_of(name, self._unit.evidence, poll.registers)
         # The sample nearest to the heartbeat: none comes on time to the microsecond.
         heartbeat = poll.heartbeat - poll.interval / 2
+        self.interval = poll.interval
         self.changes = Changes([poll.band.get(register, 0.0) for register in self.layout.names], heartbeat)
 
     def read_off(self, sample: Sample[Drive]) -> tuple[str, str]:

@@ -255,14 +255,13 @@ class _Served:
         """How it is now. Any thread."""
         there = self._open
         if there is None:
-            return LinePicture(self.name, False, {})
+            return LinePicture(self.name, False, {}, why=self._why)
         bus, gateways = there
         with suppress(DrivebusError):
             stats = bus.stats()
             counts = {name: stats[name] for name in stats if isinstance(stats[name], int | float)}
-            return LinePicture(
-                self.name, True, counts, self._polling.last(), tuple(_picture_of(gateway) for gateway in gateways)
-            )
+            asked = tuple(_picture_of(gateway) for gateway in gateways)
+            return LinePicture(self.name, True, counts, self._polling.last(), asked, tuple(stats.hints))
         return LinePicture(self.name, False, {})
 
     def status(self) -> dict[str, Any]:

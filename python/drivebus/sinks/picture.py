@@ -23,6 +23,7 @@ class DrivePicture:
         values: One for each name of the layout.
         state: What it is doing, in words; empty where its family has no word for that, or it did not answer.
         fault: The fault that it is in, in words; empty where it is in none, or that cannot be told.
+        interval: Seconds from one sample to the next.
     """
 
     poll: int
@@ -32,6 +33,7 @@ class DrivePicture:
     values: tuple[Value, ...]
     state: str = ""
     fault: str = ""
+    interval: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,8 @@ class LinePicture:
         counts: What was counted since it was opened, by the names of `drivebus.Stats`; empty where it is not open.
         drives: What each drive that is polled said last.
         gateways: Who asks over the network.
+        hints: What the counters most likely mean, and what to do, in words.
+        why: Why its port is not open, in words; empty where it is.
     """
 
     name: str
@@ -66,6 +70,8 @@ class LinePicture:
     counts: Mapping[str, float]
     drives: tuple[DrivePicture, ...] = ()
     gateways: tuple[GatewayPicture, ...] = ()
+    hints: tuple[str, ...] = ()
+    why: str = ""
 
 
 @dataclass(frozen=True)
