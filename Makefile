@@ -21,7 +21,7 @@ export CARGO_NET_RETRY := 10
 export PROPTEST_RNG_SEED ?= 1
 
 RUST_SOURCES   := Cargo.toml Cargo.lock $(shell find crates -type f \( -name '*.rs' -o -name '*.toml' -o -name '*.csv' -o -name '*.json' -o -name '*.md' \))
-PYTHON_SOURCES := pyproject.toml README.md $(shell find python -type f \( -name '*.py' -o -name '*.pyi' -o -name py.typed \))
+PYTHON_SOURCES := pyproject.toml README.md $(shell find python -type f ! -name '*.so' ! -name '*.pyd' ! -name '*.pyc')
 # The extension module has no Rust tests, but is named everywhere: a crate's features are those of all that is named, and with
 # other features it is built once more. Benchmarks have no tests, and need what nothing else does.
 RUST_TESTED := --workspace --exclude drivebus-benches

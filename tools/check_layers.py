@@ -79,7 +79,7 @@ ROOMS: list[set[str]] = [
     {"values", "checks", "rtu"},
     {"strict_attributes", "look", "spool"},
     {"profile", "capture", "sinks"},
-    {"sim"},
+    {"sim", "web"},
     {"line"},
     {"identify", "site"},
     {"operations"},
@@ -138,6 +138,7 @@ USERS: dict[str, set[str]] = {
         "site",
         "sniffer",
         "trial",
+        "web",
     },
     "__main__": {"cli"},
 }

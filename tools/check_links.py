@@ -18,7 +18,7 @@ OWN_FOLDER = re.compile(r"(?<![\w.~])/(?:home|Users|root|work)/[\w.-]+")
 
 
 def tracked(root: Path) -> list[Path]:
-    """Every file that git knows or would take, links and binaries left out."""
+    """Every file that git knows or would take; links, binaries, and scripts of others that were packed are left out."""
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"],
         cwd=root,
@@ -26,7 +26,8 @@ def tracked(root: Path) -> list[Path]:
         capture_output=True,
         text=True,
     )
-    return [path for name in listed.stdout.split("\0") if name and (path := root / name).is_file()]
+    names = [name for name in listed.stdout.split("\0") if name and not name.endswith(".min.js")]
+    return [path for name in names if (path := root / name).is_file()]
 
 
 def leads_nowhere(path: Path, target: str, root: Path) -> bool:

@@ -1,10 +1,10 @@
-"""Writes LICENSES-THIRD-PARTY.txt: the crates that are linked into the wheels, with the texts of their licences.
+"""Writes LICENSES-THIRD-PARTY.txt: the crates that are linked into the wheels, and files of others that lie in them.
 
     python -m tools.third_party [--check]
 
     --check   changes nothing; the exit code is 1 when the file is not what it would be
 
-A text that several crates have stands there once. Macros, which only the compiler runs, are not linked in.
+The texts of their licences stand there, too, each once. Macros, which only the compiler runs, are not linked in.
 """
 
 from __future__ import annotations
@@ -27,6 +27,10 @@ SYSTEMS = (
     "aarch64-apple-darwin",
 )
 NAMES = ("licen", "copying", "copyright", "notice", "unlicense")
+VENDORED = {
+    "dygraphs 2.2.1": ("MIT", ROOT / "python/drivebus/web/static/dygraphs.txt", "The licence is the MIT licence:")
+}
+"""Files of others: their licence, and where its text stands, behind which line."""
 LINE = "=" * 80
 HEAD = """\
 drivebus itself is under the licences in LICENSE-MIT and LICENSE-APACHE.
@@ -76,7 +80,12 @@ def text() -> str:
         for path in files:
             lines = path.read_text(encoding="utf-8").strip().splitlines()
             texts.setdefault("\n".join(line.rstrip() for line in lines), []).append(crate)
-    parts = [HEAD, "\n".join(f"- {crate}: {licence}" for crate, licence in crates.items()) + "\n"]
+    works = dict(crates)
+    for work, (licence, path, behind) in VENDORED.items():
+        works[work] = licence
+        texts.setdefault(path.read_text(encoding="utf-8").partition(behind)[2].strip(), []).append(work)
+    works = dict(sorted(works.items()))
+    parts = [HEAD, "\n".join(f"- {work}: {licence}" for work, licence in works.items()) + "\n"]
     parts += [f"{LINE}\n{', '.join(dict.fromkeys(whose))}\n{LINE}\n\n{licence}\n" for licence, whose in texts.items()]
     return "\n".join(parts)
 
