@@ -117,7 +117,7 @@ def test_drives_are_chosen_by_name_and_by_group_each_once(tmp_path: Path) -> Non
             "[drive.pump1]",
             [
                 '1: "drive" is not known here; did you mean "drives"?; allowed is "lines", "drives", "groups", '
-                '"share", "poll", "spool", "prometheus", "postgres", "mqtt", "sparkplug"'
+                '"share", "poll", "spool", "prometheus", "postgres", "mqtt", "sparkplug", "web", "people"'
             ],
         ),
         ("lines = 3", ["1: lines is a table of tables, such as [lines.NAME]"]),

@@ -16,6 +16,7 @@ from drivebus.operations import network_rights
 from drivebus.operations.last_will import WAYS
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
+from drivebus.service.page_mistakes import of_page
 from drivebus.sinks import Mqtt, MqttSettings, Postgres, PostgresSettings, Sparkplug, SparkplugSettings
 from drivebus.site import (
     Site,
@@ -40,7 +41,7 @@ _SIGNS = 4
 
 
 def check(site: Site) -> None:
-    """Looks through what *site* says of clients and of polls.
+    """Looks through what *site* says of clients, of polls and of where they go.
 
     Raises:
         NotAllowed: Something cannot be; each mistake is named with its line.
@@ -52,6 +53,7 @@ def check(site: Site) -> None:
     wrong |= set(_of_postgres(site))
     wrong |= set(_of_mqtt(site.mqtt)) if site.mqtt is not None else set()
     wrong |= set(_of_sparkplug(site.sparkplug)) if site.sparkplug is not None else set()
+    wrong |= set(of_page(site))
     if wrong:
         count = "one mistake" if len(wrong) == 1 else f"{len(wrong)} mistakes"
         told = [f"{site.path}:{line}: {reason}" for line, reason in sorted(wrong)]

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from drivebus.site.sinks import SitePostgres, SitePrometheus
     from drivebus.site.sparkplug import SiteSparkplug
     from drivebus.site.state_folder import state_file
+    from drivebus.site.web import SitePerson, SiteWeb
 
 __all__ = [
     "FILE",
@@ -26,12 +27,14 @@ __all__ = [
     "SiteLine",
     "SiteMqtt",
     "SiteMqttAllow",
+    "SitePerson",
     "SitePoll",
     "SitePostgres",
     "SitePrometheus",
     "SiteShare",
     "SiteSparkplug",
     "SiteSpool",
+    "SiteWeb",
     "families_on",
     "forget",
     "known_family",
@@ -53,5 +56,6 @@ if not TYPE_CHECKING:
             "share": ("SiteAllow", "SiteShare", "SiteGateway"),
             "sinks": ("SitePostgres", "SitePrometheus"),
             "state_folder": ("state_file",),
+            "web": ("SitePerson", "SiteWeb"),
         },
     )

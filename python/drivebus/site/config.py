@@ -35,6 +35,7 @@ from drivebus.site.reading import Reading, Wrong, flag, one_of, quoted, text, te
 from drivebus.site.share import SiteShare, share_of
 from drivebus.site.sinks import SitePostgres, SitePrometheus, postgres_of, prometheus_of
 from drivebus.site.sparkplug import SiteSparkplug, sparkplug_of
+from drivebus.site.web import SitePerson, SiteWeb, people_of, web_of
 
 __all__ = ["FILE", "Site"]
 
@@ -42,7 +43,8 @@ FILE = "drivebus.toml"
 """What the file is called."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
-_SECTIONS = ("lines", "drives", "groups", "share", "poll", "spool", "prometheus", "postgres", "mqtt", "sparkplug")
+_SINKS = ("prometheus", "postgres", "mqtt", "sparkplug")
+_SECTIONS = ("lines", "drives", "groups", "share", "poll", "spool", *_SINKS, "web", "people")
 _LARGEST = 1_000_000
 """Bytes that such a file may have."""
 
@@ -63,6 +65,8 @@ class Site:
         postgres: Where their samples go.
         mqtt: The broker that is told of them, and by which they may be told something.
         sparkplug: The edge node of Sparkplug that they are.
+        web: Where people find the page.
+        people: Who may log in there.
     """
 
     path: Path
@@ -76,6 +80,8 @@ class Site:
     postgres: SitePostgres | None = None
     mqtt: SiteMqtt | None = None
     sparkplug: SiteSparkplug | None = None
+    web: SiteWeb | None = None
+    people: tuple[SitePerson, ...] = ()
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Site:
@@ -133,8 +139,10 @@ class _Reader:
         polls, spool = polls_of(self._file, drives, groups), spool_of(self._file)
         prometheus, postgres = prometheus_of(self._file), postgres_of(self._file)
         mqtt, sparkplug = mqtt_of(self._file, drives, groups), sparkplug_of(self._file)
+        web, people = web_of(self._file), people_of(self._file)
         self._file.finish()
-        return Site(self._file.path, lines, drives, groups, share, polls, spool, prometheus, postgres, mqtt, sparkplug)
+        sinks = (prometheus, postgres, mqtt, sparkplug)
+        return Site(self._file.path, lines, drives, groups, share, polls, spool, *sinks, web, people)
 
     def _tables(self, section: str, read: Callable[[str, dict[str, Any]], Any]) -> Iterator[tuple[str, Any]]:
         """Each table in *section*, as *read* makes it."""

@@ -77,9 +77,18 @@ class Reading:
             raise BadArgument("\n".join([f"{self.path} has {count}; nothing was opened:", *told]))
 
     def value(
-        self, where: Key, table: Mapping[str, Any], key: str, read: Callable[[Any], Any], needed: bool = False
+        self,
+        where: Key,
+        table: Mapping[str, Any],
+        key: str,
+        read: Callable[[Any], Any],
+        needed: bool = False,
+        is_secret: bool = False,
     ) -> Any:
-        """The value of *key*, or None where there is none or a wrong one, of which the message tells."""
+        """The value of *key*, or None where there is none or a wrong one, of which the message tells.
+
+        What is secret stands in no message.
+        """
         if key not in table:
             if needed:
                 self.complain(where, f"{'.'.join(each for each in where if isinstance(each, str))} has no {key}")
@@ -87,7 +96,8 @@ class Reading:
         try:
             return read(table[key])
         except Wrong as error:
-            self.complain((*where, key), f"{key} = {_shown(table[key])}: {error}")
+            shown = "…" if is_secret else _shown(table[key])
+            self.complain((*where, key), f"{key} = {shown}: {error}")
             return None
 
     def check_keys(self, table: Mapping[str, Any], allowed: tuple[str, ...], where: Key) -> None:

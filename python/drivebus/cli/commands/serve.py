@@ -24,11 +24,20 @@ __all__ = ["COMMANDS"]
 @click.argument("file", required=False)
 @click.option("--check", "checks", is_flag=True, help="Say what is wrong in the file, and end. Nothing is opened.")
 @click.option("--status", "shows", is_flag=True, help="Say how the service does that runs, and end.")
+@click.option(
+    "--password", "asks", is_flag=True, help="Ask for a password, print what stands for it in the file, and end."
+)
 @click.option("--for", "duration", type=Seconds(0), metavar="SECONDS", help="Stop after so long.")
 @click.pass_context
 @pass_session
 def serve(
-    session: Session, context: click.Context, file: str | None, checks: bool, shows: bool, duration: float | None
+    session: Session,
+    context: click.Context,
+    file: str | None,
+    checks: bool,
+    shows: bool,
+    asks: bool,
+    duration: float | None,
 ) -> None:
     """Serve the lines of drivebus.toml, or of FILE, until Ctrl-C or SIGTERM: for a service.
 
@@ -37,8 +46,13 @@ def serve(
     """
     from drivebus import service
 
-    if checks and shows:
-        raise WrongUse("--check looks at the file and --status at the service: give one of them")
+    if checks + shows + asks > 1:
+        raise WrongUse(
+            "--check looks at the file, --status at the service, and --password at neither: give one of them"
+        )
+    if asks:
+        _ask(session)
+        return
     config = context.find_root().params.get("config")
     if file is not None and config is not None:
         raise WrongUse(f"{file} and --config {config} are two files: give one of them")
@@ -65,6 +79,18 @@ def serve(
         signal.signal(number, end)
     with suppress(KeyboardInterrupt):
         served.run(duration)
+
+
+def _ask(session: Session) -> None:
+    """Asks twice for a password, without showing it, and prints the line for the file."""
+    from drivebus.web import LEAST, hashed
+
+    password = click.prompt("Password of who may log in", hide_input=True, confirmation_prompt="Once more", err=True)
+    if len(password) < LEAST:
+        raise WrongUse(f"that is too short: a password has {LEAST} characters or more")
+    told = hashed(password)
+    session.out.record({"password": told})
+    session.out.say(f'password = "{told}"')
 
 
 def _show(session: Session, status: dict[str, Any]) -> None:
