@@ -1,7 +1,8 @@
 #!/bin/sh
 # Brings mbpoll, libmodbus and LinuxCNC's HAL, which the interop tests talk to, tshark, which reads captures, valgrind,
 # which counts instructions, strace, which writes down system calls, PostgreSQL and Mosquitto,
-# which samples are delivered to, and Prometheus, which scrapes metrics, into .tools/ without touching the system.
+# which samples are delivered to, Prometheus, which scrapes metrics, and Chromium, which opens the page, into .tools/
+# without touching the system.
 #
 # Needs no root: packages are downloaded and unpacked, not installed. Where apt is not there it says what is missing,
 # and the checks that need it are skipped (with CI=true they fail).
@@ -33,19 +34,24 @@ have_postgres() {
     command -v initdb >/dev/null 2>&1 || ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 ||
         ls "$tools"/usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1
 }
+have_chromium() {
+    command -v chromium-headless-shell >/dev/null 2>&1 || command -v chromium >/dev/null 2>&1 ||
+        command -v chromium-browser >/dev/null 2>&1 || command -v google-chrome >/dev/null 2>&1 ||
+        [ -x "$tools/usr/lib/chromium/chromium-headless-shell" ]
+}
 # Debian has it where only root looks for programs.
 have_mosquitto() {
     command -v mosquitto >/dev/null 2>&1 || [ -x /usr/sbin/mosquitto ] || [ -x "$tools/usr/sbin/mosquitto" ]
 }
 have_all() {
     have_program && have_library && have_valgrind && have_strace && have_tshark && have_postgres &&
-        have_mosquitto && have_prometheus && have_hal
+        have_mosquitto && have_prometheus && have_chromium && have_hal
 }
 lacking() {
-    echo "of mbpoll, libmodbus, tshark, valgrind, strace, PostgreSQL, Mosquitto, Prometheus and LinuxCNC some are missing ($1); the checks" >&2
+    echo "of mbpoll, libmodbus, tshark, valgrind, strace, PostgreSQL, Mosquitto, Prometheus, Chromium and LinuxCNC some are missing ($1); the checks" >&2
     echo "that need them will be skipped." >&2
-    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 tshark valgrind strace postgresql mosquitto prometheus linuxcnc-uspace" >&2
-    echo "    macOS:           brew install libmodbus wireshark postgresql mosquitto prometheus, and mbpoll from its source" >&2
+    echo "    Debian, Ubuntu:  apt-get install mbpoll libmodbus5 tshark valgrind strace postgresql mosquitto prometheus chromium-headless-shell linuxcnc-uspace" >&2
+    echo "    macOS:           brew install libmodbus wireshark postgresql mosquitto prometheus chromium, and mbpoll from its source" >&2
     exit 0
 }
 
@@ -59,6 +65,7 @@ large=
 have_tshark || large=tshark
 have_postgres || large="$large postgresql"
 have_mosquitto || large="$large mosquitto"
+have_chromium || large="$large chromium-headless-shell"
 command -v apt-get >/dev/null 2>&1 && command -v dpkg >/dev/null 2>&1 || lacking "no apt here"
 
 mkdir -p "$tools/apt/lists/partial" "$tools/apt/cache/archives/partial" "$tools/apt/debs"
@@ -67,7 +74,7 @@ cd "$tools/apt/debs" || exit 1
 as_is="-q -o APT::Sandbox::User=root -o Acquire::Retries=5"
 # Where the system's package lists are empty or old: lists of our own.
 own="$as_is -o Dir::State::lists=$tools/apt/lists -o Dir::Cache=$tools/apt/cache"
-# tshark, PostgreSQL and Mosquitto need libraries of their own: those that apt would install with them here.
+# tshark, PostgreSQL, Mosquitto and Chromium need libraries of their own: those that apt would install with them here.
 with_libraries() { apt-get -s install --no-install-recommends "$@" 2>/dev/null | awk '/^Inst/ { print $2 }'; }
 # shellcheck disable=SC2086  # options, to be split
 for package in $large; do

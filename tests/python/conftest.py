@@ -34,10 +34,10 @@ dispositions_as_usual()
 
 # Their slaves, screens and signals are those of POSIX.
 OF_POSIX = """
-cli_monitor cli_reserved_units cli_several closing_servers end_of_program errors huanyang_asked postgres
+cli_monitor cli_reserved_units cli_several closing_servers end_of_program errors huanyang_asked page postgres
 postgres_refused postgres_settings read_only_forms record reserved_units search_huanyang serve_mqtt
 serve_mqtt_commands serve_postgres settings_changed seven_bits shared_bounds shared_port sniff_end system_calls tables
-what_came wrong_inside
+web_routes web_settings what_came wrong_inside
 """
 collect_ignore = [f"test_{name}.py" for name in OF_POSIX.split()] if sys.platform == "win32" else []
 
@@ -78,6 +78,7 @@ LONGEST = [
     "test_what_came",
     "test_record",
     "test_panel",
+    "test_page",
     "test_last_will",
     "test_forked_owner",
     "test_spoilt_line",
