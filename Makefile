@@ -49,7 +49,7 @@ help: ## what can be made
 	@echo "make semver  what the published crates promise, compared with the last tag"
 	@echo "make release-check   all that a release uploads, but the upload: made in a fresh clone, and used"
 	@echo "make oldest  somebody's Rust program with the oldest versions of what the crates need"
-	@echo "make pictures   the pictures of the README, from what the commands show"
+	@echo "make pictures   the pictures of the README, from what the commands and the page show"
 	@echo "make wheel   the wheel, in dist/"
 	@echo "make wheels  the wheels of other systems, in dist/wheels/: make wheels ONLY=aarch64"
 	@echo "make wheels-check   those wheels in Debian 11, Debian 13 and under musl: make wheels-check ONLY=musl"
@@ -174,8 +174,9 @@ examples: $(VENV)/.wheel
 wheel-smoke: dist/.wheel
 	$(BIN)/python tools/wheel_smoke.py
 
-pictures: $(VENV)/.dev $(VENV)/.wheel ## draws the pictures of the README anew
+pictures: $(VENV)/.dev $(VENV)/.wheel interop-parts ## draws the pictures of the README anew
 	$(BIN)/python -m tools.draw_pictures
+	$(BIN)/python -m tools.draw_page
 
 # --- the rest ------------------------------------------------------------------------------------------------
 
