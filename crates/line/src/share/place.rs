@@ -72,8 +72,8 @@ enum Sign {
     /// A socket, and which file it is.
     #[cfg(unix)]
     Socket { path: PathBuf, file: (u64, u64) },
-    /// A file with this secret, and that file: while it is open, its program is known to live.
-    Secret { path: PathBuf, secret: Secret, _file: Kept<fs::File> },
+    /// A file with this secret; and one beside it that is open, by which its program is known to live.
+    Secret { path: PathBuf, secret: Secret, beside: PathBuf, _kept: Kept<fs::File> },
 }
 
 /// Where programs come in.
@@ -303,6 +303,12 @@ impl Drop for Door {
         if self.opened_by.is_current() && self.sign.stands() {
             // Where it cannot be removed, who knocks finds that nobody opens.
             let _ = fs::remove_file(self.sign.path());
+        }
+        if self.opened_by.is_current()
+            && let Sign::Secret { beside, .. } = &self.sign
+        {
+            // Where it cannot be removed, the next program removes it.
+            let _ = fs::remove_file(beside);
         }
     }
 }

@@ -1,18 +1,12 @@
 //! Who knocks on the loopback and is no program of this user's, and who stands there in the place of one.
-//! Some stand between two programs: on Unix alone, for elsewhere nobody writes into the file of a program that lives.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Read, Write};
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
 use std::path::Path;
-use std::sync::LazyLock;
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, LazyLock, Mutex};
 use std::thread;
-#[cfg(unix)]
-use std::{
-    net::Shutdown,
-    sync::{Arc, Mutex},
-};
 
 use drivebus_line::Share;
 
@@ -106,8 +100,23 @@ fn who_does_not_know_the_secret_is_cut_off_however_its_bytes_are_cut() {
     });
 }
 
+/// Listens on the loopback, says so in the file of the port with this secret, and lives as a program that has the port does.
+fn stand_there(folder: &Path, secret: &str) -> (TcpListener, File) {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let there = listener.local_addr().unwrap().port();
+    let lock = files(folder, "lock").remove(0);
+    fs::write(lock.with_extension("tcp"), format!("drivebus loopback 1 {there} {secret}")).unwrap();
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(windows)]
+    std::os::windows::fs::OpenOptionsExt::share_mode(&mut options, 4);
+    let kept = options.open(lock.with_extension(format!("{there}.kept"))).unwrap();
+    #[cfg(unix)]
+    rustix::fs::flock(&kept, rustix::fs::FlockOperation::LockExclusive).unwrap();
+    (listener, kept)
+}
+
 /// Carries what comes on, and keeps each message.
-#[cfg(unix)]
 fn carry(mut from: TcpStream, mut to: TcpStream, kept: &Mutex<Vec<Vec<u8>>>) {
     let mut length = [0; 4];
     while from.read_exact(&mut length).is_ok() {
@@ -122,15 +131,13 @@ fn carry(mut from: TcpStream, mut to: TcpStream, kept: &Mutex<Vec<Vec<u8>>>) {
 }
 
 /// Stands between the program that has the port and those who knock there from now on; what the first of them says is kept.
-#[cfg(unix)]
 fn stand_between(folder: &Path) -> Arc<Mutex<Vec<Vec<u8>>>> {
     let (port, secret) = address(folder);
-    let between = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-    let there = between.local_addr().unwrap().port();
-    fs::write(&files(folder, "tcp")[0], format!("drivebus loopback 1 {there} {secret}")).unwrap();
+    let (between, file) = stand_there(folder, &secret);
     let said = Arc::new(Mutex::new(Vec::new()));
     let kept = Arc::clone(&said);
     thread::spawn(move || {
+        let _file = file;
         for (at, near) in between.incoming().enumerate() {
             let (near, far) = (near.unwrap(), TcpStream::connect((Ipv4Addr::LOCALHOST, port)).unwrap());
             let kept = if at == 0 { Arc::clone(&kept) } else { Arc::default() };
@@ -142,7 +149,6 @@ fn stand_between(folder: &Path) -> Arc<Mutex<Vec<Vec<u8>>>> {
     said
 }
 
-#[cfg(unix)]
 #[test]
 fn a_proof_that_was_heard_is_good_for_no_other_connection() {
     on_loopback("outsiders::a_proof_that_was_heard_is_good_for_no_other_connection", |folder| {
@@ -184,32 +190,15 @@ fn a_thousand_who_knock_hold_up_nobody() {
     });
 }
 
-/// A file that is kept open, as by a program that has the port.
-fn kept(path: &Path) -> File {
-    // Another one may stand there, which its program keeps.
-    let _ = fs::remove_file(path);
-    let mut options = OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(windows)]
-    std::os::windows::fs::OpenOptionsExt::share_mode(&mut options, 1 | 4);
-    let file = options.open(path).unwrap();
-    #[cfg(unix)]
-    rustix::fs::flock(&file, rustix::fs::FlockOperation::LockExclusive).unwrap();
-    file
-}
-
 /// Somebody who listens in the place of a program that has the port.
 struct Impostor {
     told: Receiver<Vec<u8>>,
-    _file: File,
+    _kept: File,
 }
 
 /// Listens where the file says, and keeps what is said there; answers each with `answer`.
 fn impostor(folder: &Path, answer: &'static [u8]) -> Impostor {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-    let there = listener.local_addr().unwrap().port();
-    let mut file = kept(&files(folder, "lock")[0].with_extension("tcp"));
-    file.write_all(format!("drivebus loopback 1 {there} {}", "5a".repeat(32)).as_bytes()).unwrap();
+    let (listener, kept) = stand_there(folder, &"5a".repeat(32));
     let (tell, told) = channel();
     thread::spawn(move || {
         for stream in listener.incoming() {
@@ -222,7 +211,7 @@ fn impostor(folder: &Path, answer: &'static [u8]) -> Impostor {
             tell.send(said).unwrap();
         }
     });
-    Impostor { told, _file: file }
+    Impostor { told, _kept: kept }
 }
 
 #[test]
@@ -277,17 +266,13 @@ fn who_stands_in_the_place_of_a_program_that_has_the_port_is_told_of() {
 }
 
 /// The greeting comes behind the proof, and says the version as it always did.
-#[cfg(unix)]
 #[test]
 fn a_program_of_another_version_is_told_so() {
     on_loopback("outsiders::a_program_of_another_version_is_told_so", |folder| {
         let _owner = open();
-        let (port, _) = address(folder);
         // Between them stands somebody who changes the version in what the guest says third.
-        let (_, secret) = address(folder);
-        let between = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-        let there = between.local_addr().unwrap().port();
-        fs::write(&files(folder, "tcp")[0], format!("drivebus loopback 1 {there} {secret}")).unwrap();
+        let (port, secret) = address(folder);
+        let (between, _kept) = stand_there(folder, &secret);
         let guest = thread::spawn(|| open_as(options()).unwrap_err().to_string());
         let (mut near, _) = between.accept().unwrap();
         let mut far = TcpStream::connect((Ipv4Addr::LOCALHOST, port)).unwrap();

@@ -1,5 +1,5 @@
-//! The files of a port in its folder: nobody else than who meets there reads or writes them. One of them is a lock, and one is
-//! kept by the program that wrote it, for as long as that lives.
+//! The files of a port in its folder: nobody else than who meets there reads or writes them. One of them is a lock, and some
+//! are kept open by the program that made them, for as long as that lives.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -51,6 +51,11 @@ mod of_this_system {
             Ok(file)
         }
 
+        /// The file of this port with such an ending, made anew.
+        pub(in crate::share::place) fn new_file(&self, ending: &str) -> io::Result<File> {
+            self.file(ending, true)
+        }
+
         /// The file of this port with such an ending, made anew, and [kept](is_kept) by this program.
         pub(in crate::share::place) fn kept_file(&self, ending: &str) -> io::Result<Kept<File>> {
             let file = Kept::opened(|| self.file(ending, true))?;
@@ -93,16 +98,19 @@ mod of_this_system {
     /// What the system says of a file that another program keeps for itself. Source: *System Error Codes*,
     /// `ERROR_SHARING_VIOLATION`.
     const KEPT_BY_ANOTHER: i32 = 32;
-    /// What others may do with a file that is open. Source: `CreateFileW`, `FILE_SHARE_READ` and `FILE_SHARE_DELETE`.
-    const SHARE_READ: u32 = 1;
+    /// What may be done with a file that is open. Source: `CreateFileW`, `FILE_SHARE_DELETE`.
     const SHARE_DELETE: u32 = 4;
 
     impl Place {
-        /// The file of this port with such an ending, made anew, and [kept](is_kept) by this program: others may read it,
-        /// and put another one in its place.
+        /// The file of this port with such an ending, made anew.
+        pub(in crate::share::place) fn new_file(&self, ending: &str) -> io::Result<File> {
+            OpenOptions::new().write(true).create_new(true).open(self.path(ending))
+        }
+
+        /// The file of this port with such an ending, made anew, and [kept](is_kept) by this program.
         pub(in crate::share::place) fn kept_file(&self, ending: &str) -> io::Result<Kept<File>> {
             let mut options = OpenOptions::new();
-            options.write(true).create_new(true).share_mode(SHARE_READ | SHARE_DELETE);
+            options.write(true).create_new(true).share_mode(SHARE_DELETE);
             options.open(self.path(ending)).map(Kept::new)
         }
 

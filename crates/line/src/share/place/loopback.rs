@@ -2,9 +2,9 @@
 //! its guests know each other.
 //!
 //! It is one line of text, made anew by each program that has the port: [`FORM`], the TCP port, and the secret as two digits a
-//! byte. That program keeps the file open, and removes it when it gives the port up. If it was killed, the file is left, and with
-//! it an address at which nobody listens, or somebody else. It is seen that nobody has the file open, and who listens there
-//! cannot know the secret.
+//! byte. It is removed when that program gives the port up. If it was killed, the file is left, and with it an address at which
+//! nobody listens, or somebody else. So the program keeps a second file open, which is named after the TCP port: where nobody
+//! has that open, nobody is asked.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read as _, Write as _};
@@ -28,6 +28,8 @@ const FORM: &str = "drivebus loopback 1";
 const MOST: u64 = 128;
 /// What its name ends in while it is written.
 const DRAFT: &str = "tcp-draft";
+/// What the name of the file ends in that is kept open.
+const KEPT: &str = "kept";
 /// How long a connection within this machine may take. Where nobody listens, Windows goes on trying for longer.
 const CONNECTS: Duration = Duration::from_secs(1);
 
@@ -38,17 +40,36 @@ impl Place {
         listener.set_nonblocking(true)?;
         let port = listener.local_addr()?.port();
         let secret = Secret::random()?;
+        self.tidy_up()?;
+        let ending = format!("{port}.{KEPT}");
+        let (beside, kept) = (self.path(&ending), self.kept_file(&ending)?);
         let (path, draft) = (self.path(self.ending()), self.path(DRAFT));
-        match fs::remove_file(&draft) {
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
-            _ => {}
-        }
-        let mut file = self.kept_file(DRAFT)?;
+        let mut file = self.new_file(DRAFT)?;
         file.write_all(format!("{FORM} {port} {}\n", secret.written()).as_bytes())?;
+        drop(file);
         fs::rename(&draft, &path)?;
         let listener = Kept::new(Listener::Tcp(listener));
         let entrance = Entrance { listener, reached_by: ReachedBy::Strangers(secret.clone()) };
-        Ok(Door::new(std::iter::once(entrance), Sign::Secret { path, secret, _file: file }))
+        Ok(Door::new(std::iter::once(entrance), Sign::Secret { path, secret, beside, _kept: kept }))
+    }
+
+    /// Removes what programs have left that are gone.
+    fn tidy_up(&self) -> io::Result<()> {
+        let mut left = vec![self.path(DRAFT)];
+        for entry in fs::read_dir(&self.folder)? {
+            let path = entry?.path();
+            let name = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.strip_prefix(&self.name));
+            let is_one =
+                name.is_some_and(|rest| rest.starts_with('.')) && path.extension().is_some_and(|end| end == KEPT);
+            left.extend((is_one && !is_kept(&path)).then_some(path));
+        }
+        for path in left {
+            match fs::remove_file(&path) {
+                Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     /// Connects to the program that serves the port; by `until` where many knock.
@@ -59,7 +80,7 @@ impl Place {
                 return Err(if path.exists() { Nobody::Gone } else { Nobody::Absent });
             };
             // Whoever listens there now, is not the program that wrote it.
-            if !is_kept(&path) {
+            if !is_kept(&self.path(&format!("{port}.{KEPT}"))) {
                 return Err(Nobody::Gone);
             }
             match connect(port) {
@@ -114,7 +135,9 @@ mod tests {
 
         fn files(&self) -> Vec<String> {
             let files = fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-            files.collect()
+            let mut files: Vec<_> = files.collect();
+            files.sort();
+            files
         }
     }
 
@@ -135,13 +158,13 @@ mod tests {
         fs::write(place.path(DRAFT), "of a program that was killed meanwhile").unwrap();
         let door = place.open_door().unwrap();
         assert!(place.has(&door));
-        assert_eq!(room.files(), ["port-1.tcp"]);
+        let (port, secret) = read(&place.path("tcp")).unwrap();
+        assert_eq!(room.files(), [format!("port-1.{port}.kept"), "port-1.tcp".to_owned()]);
         #[cfg(unix)]
-        {
+        for file in room.files() {
             use std::os::unix::fs::PermissionsExt;
-            assert_eq!(fs::metadata(place.path("tcp")).unwrap().permissions().mode() & 0o777, 0o600);
+            assert_eq!(fs::metadata(room.0.join(file)).unwrap().permissions().mode() & 0o777, 0o600);
         }
-        let (_, secret) = read(&place.path("tcp")).unwrap();
         let reached = place.knock(soon()).unwrap();
         assert_eq!(reached.secret.as_ref(), Some(&secret));
         assert_eq!(door.entrances[0].reached_by, ReachedBy::Strangers(secret));
@@ -170,18 +193,20 @@ mod tests {
         assert!(matches!(place.knock(soon()), Err(Nobody::Absent)));
         let door = place.open_door().unwrap();
         let left = fs::read(place.path("tcp")).unwrap();
-        // Somebody listens there all the same: nobody who lives has the file open.
-        fs::remove_file(place.path("tcp")).unwrap();
-        let shorter = left.len() - 2;
-        let twice = [left.clone(), left.clone()].concat();
-        for file in [&left[..], &left[..shorter], b"", b"drivebus loopback 2 1 00", b"\xFF\xFE", &twice] {
+        drop(door);
+        // Somebody listens there all the same, and there is a file that nobody has open.
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+        let there = listener.local_addr().unwrap().port();
+        fs::write(place.path(&format!("{there}.{KEPT}")), "").unwrap();
+        let there = format!("{FORM} {there} {}", "00".repeat(32));
+        let shorter = &left[..left.len() - 2];
+        for file in [there.as_bytes(), &left, shorter, b"", b"drivebus loopback 2 1 00", b"\xFF\xFE", &left.repeat(2)] {
             fs::write(place.path("tcp"), file).unwrap();
             assert!(matches!(place.knock(soon()), Err(Nobody::Gone)));
         }
-        drop(door);
-        assert_eq!(room.files(), ["port-1.tcp"], "it is not that door's any more");
         let door = place.open_door().unwrap();
         assert!(place.has(&door) && place.knock(soon()).is_ok());
+        assert_eq!(room.files().len(), 2, "what was left is gone");
     }
 
     #[test]
