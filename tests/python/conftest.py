@@ -36,8 +36,8 @@ dispositions_as_usual()
 OF_POSIX = """
 cli_monitor cli_reserved_units cli_several closing_servers end_of_program errors huanyang_asked page postgres
 postgres_refused postgres_settings read_only_forms record reserved_units search_huanyang serve_mqtt
-serve_mqtt_commands serve_postgres settings_changed seven_bits shared_bounds shared_port sniff_end system_calls tables
-web_routes web_settings what_came wrong_inside
+serve_mqtt_commands serve_postgres serve_sparkplug settings_changed seven_bits shared_bounds shared_port sniff_end
+sparkplug system_calls tables web_routes web_settings web_strangers what_came wrong_inside
 """
 collect_ignore = [f"test_{name}.py" for name in OF_POSIX.split()] if sys.platform == "win32" else []
 

@@ -17,9 +17,10 @@ from playwright.sync_api import Browser, Dialog, Page, Response, expect
 from drivebus.web import Web, sessions
 
 from .chromium import chromium
+from .made_up_plant import EVIL, Plant
+from .made_up_plant import made_up as made_up_plant
 from .page_plant import FORWARD, MARIA, OTTO, REVERSE, STOP, PagePlant, page_plant
 from .tcp_client import seen
-from .test_web_routes import EVIL, Plant
 
 LARGEST = 300_000
 """Bytes of all that a page loads."""
@@ -42,11 +43,8 @@ def plant(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterato
 @pytest.fixture
 def made_up(browser: Browser) -> Iterator[tuple[Plant, Web]]:  # noqa: ARG001 - skips
     """A plant without drives, whose faults are attacks."""
-    plant = Plant()
-    web = Web("127.0.0.1:0", (), None, plant.shown())
-    plant.url, plant.port = f"http://127.0.0.1:{web.port}", web.port
-    yield plant, web
-    web.close()
+    with made_up_plant() as plant:
+        yield plant
 
 
 @contextmanager

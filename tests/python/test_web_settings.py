@@ -16,8 +16,8 @@ from drivebus.site import Site, SitePerson
 from drivebus.web import is_hash
 from drivebus.web.passwords import is_right
 
+from .made_up_plant import make_certificate
 from .page_plant import MARIA
-from .test_web_routes import make_certificate
 
 HASH = "scrypt$32768$8$1$MDEyMzQ1Njc4OWFiY2RlZg==$xxaWgqTSKTdh7WrfWLps/DMbPoovZsowrLVRbAkJkjA="
 """Of `MARIA`, made by hashlib alone."""
