@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::path::Path;
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
@@ -351,4 +352,17 @@ fn a_stop_takes_back_what_was_decided_on_before_it() {
         call(starts, &Request::write(ACCELERATION, 9), CallOptions::new().halts(starts.halts(unit(1)))).unwrap();
         assert_eq!(written(), count + 2);
     }
+}
+
+/// How programs meet is said by their environment, so it is another process that runs all of this again.
+#[test]
+fn all_of_it_holds_on_the_loopback_too() {
+    const OVER_LOOPBACK: &str = "DRIVEBUS_TESTS_OVER_LOOPBACK";
+    if std::env::var_os(OVER_LOOPBACK).is_some() {
+        return; // this is the other process
+    }
+    let mut again = Command::new(std::env::current_exe().unwrap());
+    let done = again.args(["--test-threads", "2"]).env(OVER_LOOPBACK, "1").output().unwrap();
+    let said = [done.stdout, done.stderr].map(|said| String::from_utf8_lossy(&said).into_owned());
+    assert!(done.status.success() && said[0].contains(" 0 filtered out"), "{}", said.concat());
 }
