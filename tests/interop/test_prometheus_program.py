@@ -15,36 +15,25 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from tests.python.plant_text import HALL, drive, served
 
 from drivebus import Simulator
-from drivebus.service import Service
-from drivebus.site import Site
 
 from .conftest import ROOT, TOOLS, lacking
 
-PLANT = """
-[lines.hall]
-port = "{port}"
-baud = 115200
-[drives.pump]
-line = "hall"
-unit = 1
-profile = "gd350"
-[drives.fan]
-line = "hall"
-unit = 2
-profile = "vfd500"
-[drives.ghost]
-line = "hall"
-unit = 3
-profile = "gd350"
-[[poll]]
+PLANT = (
+    HALL
+    + drive("pump", 1)
+    + drive("fan", 2, "vfd500")
+    + drive("ghost", 3)
+    + """[[poll]]
 interval = 0.2
 [[share.tcp]]
 address = "127.0.0.1:0"
 [prometheus]
 address = "127.0.0.1:{metrics}"
 """
+)
 
 SCRAPES = """
 global: {{scrape_interval: 1s}}
@@ -89,15 +78,9 @@ def metrics(tmp_path: Path) -> Iterator[int]:
         file = tmp_path / "drivebus.toml"
         file.write_text(PLANT.format(port=simulator.port, metrics=port))
         heard: list[str] = []
-        service = Service(Site.load(file), heard.append)
-        serving = threading.Thread(target=service.run)
-        serving.start()
-        try:
+        with served(file, heard):
             until(lambda: "drivebus_running_frequency_hertz" in fetched(f"http://127.0.0.1:{port}/metrics"))
             yield port
-        finally:
-            service.end()
-            serving.join()
 
 
 def test_its_checker_finds_nothing_wrong(metrics: int) -> None:

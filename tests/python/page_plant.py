@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import socket
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -13,36 +12,20 @@ from pathlib import Path
 import drivebus
 from drivebus import Simulator
 from drivebus.service import Service
-from drivebus.site import Site
 from drivebus.web import hashed
 
+from .plant_text import HALL, drive, served
 from .tcp_client import seen
 
 MARIA, OTTO = "correct horse battery", "only looking on"
 """Passwords: of who may order, and of who looks."""
-PLANT = """
-[lines.hall]
-port = "{port}"
-baud = 115200
-[drives.pump]
-line = "hall"
-unit = 1
-profile = "gd350"
-[drives.fan]
-line = "hall"
-unit = 2
-profile = "gd350"
-[drives.meter]
-line = "hall"
-unit = 3
-profile = "gd350"
-read_only = true
-[drives.ghost]
-line = "hall"
-unit = 9
-profile = "gd350"
-read_only = true
-[share]
+PLANT = (
+    HALL
+    + drive("pump", 1)
+    + drive("fan", 2)
+    + drive("meter", 3, "gd350", "read_only = true")
+    + drive("ghost", 9, "gd350", "read_only = true")
+    + """[share]
 audit = "audit.jsonl"
 [[poll]]
 interval = {interval}
@@ -59,6 +42,7 @@ name = "otto"
 password = "{otto}"
 role = "look"
 """
+)
 
 FORWARD, REVERSE, STOP, COAST = 1, 2, 5, 6
 _CONTROL = 0x2000
@@ -101,20 +85,14 @@ def page_plant(folder: Path, interval: float = 0.2, dead_man: object = 60, more:
     with Simulator({1: "gd350", 2: "gd350", 3: "gd350"}, transport="tcp", baudrate=115200) as simulator:
         with drivebus.Bus(simulator.port, baudrate=115200) as bus:
             for unit in (1, 2):
-                drive = bus.drive(unit, "gd350")
-                drive.prepare_control()
-                drive.write({"P00.11": 0.5, "P00.12": 0.5})
+                motor = bus.drive(unit, "gd350")
+                motor.prepare_control()
+                motor.write({"P00.11": 0.5, "P00.12": 0.5})
         with socket.create_server(("127.0.0.1", 0)) as free:
             port = free.getsockname()[1]
         people = {"maria": hash_of(MARIA), "otto": hash_of(OTTO)}
         text = PLANT.format(port=simulator.port, web=port, interval=interval, dead_man=dead_man, **people)
         file.write_text(text + more)
-        service = Service(Site.load(file), heard.append)
-        serving = threading.Thread(target=service.run)
-        serving.start()
-        try:
+        with served(file, heard) as service:
             seen(lambda: any("the page is at" in text for text in heard))
             yield PagePlant(f"http://127.0.0.1:{port}", simulator, service, folder, heard)
-        finally:
-            service.end()
-            serving.join()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-import threading
 import urllib.request
 from pathlib import Path
 
@@ -11,9 +10,8 @@ import pytest
 
 pytest.importorskip("starlette")
 
-from drivebus.service import Service
-from drivebus.site import Site
 
+from .plant_text import served
 from .tcp_client import seen
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -31,16 +29,10 @@ def test_its_page_opens_and_its_drives_answer(tmp_path: Path) -> None:
     file = tmp_path / "drivebus.toml"
     file.write_text(text, encoding="utf-8")
     heard: list[str] = []
-    service = Service(Site.load(file), heard.append)
-    serving = threading.Thread(target=service.run)
-    serving.start()
-    try:
+    with served(file, heard) as service:
         seen(lambda: any("page" in each for each in heard))
         with urllib.request.urlopen(f"http://127.0.0.1:{free['8080']}/login", timeout=20) as answer:
             shown = answer.read().decode()
         assert "password" in shown
         seen(lambda: {each.layout.drive for line in service.picture().lines for each in line.drives} == DRIVES)
         assert all(not each.missing for line in service.picture().lines for each in line.drives)
-    finally:
-        service.end()
-        serving.join()

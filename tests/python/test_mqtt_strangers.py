@@ -19,8 +19,9 @@ from drivebus.service import check
 from drivebus.site import Site
 
 from .mqtt_broker import Broker, Somebody, broker, environment, program
+from .plant_text import served
 from .tcp_client import seen
-from .test_serve_mqtt import PLANT, served
+from .test_serve_mqtt import PLANT
 
 SECRET = "a secret that nobody is told"
 HERE = "drivebus/hall 1"

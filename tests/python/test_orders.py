@@ -16,30 +16,10 @@ from drivebus.service.events import Events
 from drivebus.service.orders import HALTS, ORDERS, Door, Order, Orders
 from drivebus.site import Site
 
+from .plant_text import HALL, drive
 from .tcp_client import seen
 
-PLANT = """
-[lines.hall]
-port = "{port}"
-baud = 115200
-[drives.pump]
-line = "hall"
-unit = 1
-profile = "gd350"
-[drives.fan]
-line = "hall"
-unit = 2
-profile = "gd350"
-[drives.meter]
-line = "hall"
-unit = 3
-profile = "gd350"
-read_only = true
-[drives.ghost]
-line = "hall"
-unit = 9
-profile = "gd350"
-"""
+PLANT = HALL + drive("pump", 1) + drive("fan", 2) + drive("meter", 3, "gd350", "read_only = true") + drive("ghost", 9)
 ALL = frozenset(ORDERS)
 DOOR = Door("page", {"pump": ALL, "fan": ALL, "meter": ALL})
 CONTROL, FORWARD, REVERSE, STOP, COAST = 0x2000, 1, 2, 5, 6
@@ -77,9 +57,9 @@ def plant(tmp_path: Path) -> Iterator[Plant]:
     with Simulator({1: "gd350", 2: "gd350", 3: "gd350"}, transport="tcp", baudrate=115200) as simulator:
         with drivebus.Bus(simulator.port, baudrate=115200) as bus:
             for unit in (1, 2):
-                drive = bus.drive(unit, "gd350")
-                drive.prepare_control()
-                drive.write({"P00.11": 0.5, "P00.12": 0.5})
+                motor = bus.drive(unit, "gd350")
+                motor.prepare_control()
+                motor.write({"P00.11": 0.5, "P00.12": 0.5})
         yield Plant(tmp_path, simulator)
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import threading
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -20,21 +18,14 @@ from drivebus.site import Site
 from drivebus.spool import Spool
 
 from .mqtt_broker import Broker, Somebody, Way, broker, somebody
+from .plant_text import HALL, drive, served
 from .tcp_client import seen
 
-PLANT = """
-[lines.hall]
-port = "{port}"
-baud = 115200
-[drives.pump]
-line = "hall"
-unit = 1
-profile = "gd350"
-[drives.fan]
-line = "hall"
-unit = 2
-profile = "vfd500"
-[[poll]]
+PLANT = (
+    HALL
+    + drive("pump", 1)
+    + drive("fan", 2, "vfd500")
+    + """[[poll]]
 interval = 0.1
 heartbeat = 1
 [spool]
@@ -43,19 +34,8 @@ host = "127.0.0.1"
 port = {at}
 gateway = "hall 1"
 """
+)
 HERE = "drivebus/hall 1"
-
-
-@contextmanager
-def served(file: Path, heard: list[str]) -> Iterator[Service]:
-    service = Service(Site.load(file), heard.append)
-    serving = threading.Thread(target=service.run)
-    serving.start()
-    try:
-        yield service
-    finally:
-        service.end()
-        serving.join()
 
 
 def is_all_in(service: Service) -> bool:

@@ -19,21 +19,14 @@ from drivebus.sim import SimulatedDrive
 from drivebus.site import Site
 
 from .mqtt_broker import Broker, Somebody, Way, broker, somebody
+from .plant_text import HALL, drive
 from .tcp_client import seen
 
-PLANT = """
-[lines.hall]
-port = "{port}"
-baud = 115200
-[drives.pump]
-line = "hall"
-unit = 1
-profile = "gd350"
-[drives.fan]
-line = "hall"
-unit = 2
-profile = "gd350"
-[[poll]]
+PLANT = (
+    HALL
+    + drive("pump", 1)
+    + drive("fan", 2)
+    + """[[poll]]
 interval = 0.2
 registers = ["running_frequency"]
 [spool]
@@ -46,6 +39,7 @@ dead_man = {dead_man}
 drives = ["pump"]
 commands = ["run", "setpoint", "reset"]
 """
+)
 HERE = "drivebus/hall"
 
 

@@ -16,26 +16,16 @@ from drivebus.service import Service, check
 from drivebus.site import Site
 from drivebus.spool import Spool
 
+from .plant_text import HALL, drive
 from .postgres_server import ROOT, Server, server
 from .tcp_client import seen
 
-PLANT = """
-[lines.hall]
-port = "{port}"
-baud = 115200
-[drives.pump]
-line = "hall"
-unit = 1
-profile = "gd350"
-[drives.fan]
-line = "hall"
-unit = 2
-profile = "vfd500"
-[drives.ghost]
-line = "hall"
-unit = 3
-profile = "gd350"
-[[poll]]
+PLANT = (
+    HALL
+    + drive("pump", 1)
+    + drive("fan", 2, "vfd500")
+    + drive("ghost", 3)
+    + """[[poll]]
 interval = 0.1
 heartbeat = 1
 [spool]
@@ -43,6 +33,7 @@ heartbeat = 1
 conninfo = "{conninfo}"
 gateway = "hall 1"
 """
+)
 
 
 @pytest.fixture(scope="module")

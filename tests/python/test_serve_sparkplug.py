@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from contextlib import closing
 from pathlib import Path
 
@@ -12,26 +11,19 @@ pytest.importorskip("google.protobuf")
 
 from drivebus import Simulator
 from drivebus.errors import NotAllowed
-from drivebus.service import Service, check
+from drivebus.service import check
 from drivebus.site import Site
 
 from .mqtt_broker import broker
+from .plant_text import HALL, drive, served
 from .tcp_client import seen
 from .test_sparkplug import Listener
 
-PLANT = """
-[lines.line]
-port = "{port}"
-baud = 115200
-[drives.pump]
-line = "line"
-unit = 1
-profile = "gd350"
-[drives.fan]
-line = "line"
-unit = 2
-profile = "vfd500"
-[[poll]]
+PLANT = (
+    HALL
+    + drive("pump", 1)
+    + drive("fan", 2, "vfd500")
+    + """[[poll]]
 interval = 0.1
 heartbeat = 1
 [spool]
@@ -42,20 +34,18 @@ group = "plant"
 node = "hall"
 primary_host = "scada"
 """
+)
 
 
 def test_drives_live_and_die_for_a_host(tmp_path: Path) -> None:
     file, heard = tmp_path / "drivebus.toml", list[str]()
     with (
         Simulator({1: "gd350", 2: "vfd500"}, transport="tcp", baudrate=115200) as simulator,
-        broker(tmp_path) as served,
-        closing(Listener(served.port)) as listener,
+        broker(tmp_path) as at,
+        closing(Listener(at.port)) as listener,
     ):
-        file.write_text(PLANT.format(port=simulator.port, at=served.port))
-        service = Service(Site.load(file), heard.append)
-        serving = threading.Thread(target=service.run)
-        serving.start()
-        try:
+        file.write_text(PLANT.format(port=simulator.port, at=at.port))
+        with served(file, heard):
             seen(lambda: {"pump", "fan"} <= listener.host.values.keys())
             assert listener.host.values["pump"]["bus_voltage"] == 537.0
             assert listener.host.values["pump"]["status_word_1"] == 3
@@ -63,9 +53,6 @@ def test_drives_live_and_die_for_a_host(tmp_path: Path) -> None:
             seen(lambda: "pump" not in listener.host.values)
             assert "fan" in listener.host.values
             seen(lambda: str(listener.host.values[""]["event"]).startswith("pump: gives no values"))
-        finally:
-            service.end()
-            serving.join()
         seen(lambda: not listener.host.values)
         assert not listener.wrong
 
