@@ -291,6 +291,8 @@ def test_what_drives_say_waits_in_the_spool(tmp_path: Path) -> None:
             service(file, environment),
             socket.create_connection(("127.0.0.1", tcp), timeout=20) as client,
         ):
+            # What it did before it was asked first is nothing new.
+            seen(lambda: "pump1, asked" in serve(file, "--status", env=environment).stdout)
             assert ask(client, RUN) == RUN
             shown = ""
 
