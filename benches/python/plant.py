@@ -4,7 +4,10 @@ Many lines with drives that are simulated in a process of their own; `drivebus s
 Sparkplug and Prometheus, once or several times with a part of the lines each; one real server of each. In the end the
 spools are compared with what each of them has. Of several gateways none speaks Sparkplug: there would be as many hosts.
 
+With a backlog, so many samples of each drive wait in the spool before; they are of times long ago.
+
 usage: python -m benches.python.plant [--gateways 1] [--lines 32] [--drives 8] [--minutes 60] [--away 10] [--kills 20]
+           [--backlog 0] [--without-sparkplug] [--json]
 """
 
 from __future__ import annotations
@@ -35,11 +38,15 @@ from tests.python.postgres_server import Server, server
 from tests.python.test_sparkplug import Listener
 
 import drivebus
-from drivebus.spool import Spool, Spooled
+from drivebus.profile import Profile
+from drivebus.spool import Layout, Spool, Spooled
+from drivebus.values import digits_of
 
 KEPT = "persistence true\nmax_queued_messages 0\nmax_queued_bytes 0\nallow_anonymous true\n"
 """The broker keeps what its one reader has not taken yet, as long as that takes."""
 HZ = os.sysconf("SC_CLK_TCK")
+NEWEST = """SELECT coalesce(extract(epoch FROM now() - max(time)), 60) FROM drivebus.gd350
+    WHERE time > now() - INTERVAL '1 minute'"""
 LOOKS = 5.0
 """Seconds between two looks at what the service costs."""
 
@@ -154,17 +161,17 @@ def lines(count: int, drives: int) -> Iterator[list[str]]:
 
 
 def befall(
-    gateways: list[Gateway], postgres: Server, mosquitto: Broker, metrics: int, minutes: float, away: float, kills: int
+    gateways: list[Gateway], postgres: Server, mosquitto: Broker, metrics: int, given: argparse.Namespace
 ) -> dict[str, float]:
     """Time goes by, and what dies dies. Returns what one look at its metrics took, in seconds, at most."""
     begun = time.monotonic()
-    ends = begun + minutes * 60
+    ends = begun + given.minutes * 60
     # The servers are away in the middle third, one after the other and for a time both.
-    gone = begun + minutes * 20
+    gone, away = begun + given.minutes * 20, given.away
     plan = [(gone, postgres.stop_at_once), (gone + away * 30, mosquitto.kill)]
     plan += [(gone + away * 60, postgres.start), (gone + away * 90, mosquitto.start)] if away else []
     plan = plan if away else []
-    deaths = sorted(random.uniform(begun, ends) for _ in range(kills))
+    deaths = sorted(random.uniform(begun, ends) for _ in range(given.kills))
     slowest = 0.0
     while (now := time.monotonic()) < ends:
         while plan and now >= plan[0][0]:
@@ -193,16 +200,37 @@ def status(folder: Path) -> dict[str, Any]:
     return {}
 
 
-def until_all_is_in(gateways: Sequence[Gateway], most: float) -> float:
-    """Waits until no sink is behind by more than what comes in a few seconds; how long that took, in seconds."""
-    begun = time.monotonic()
+def until_all_is_in(gateways: Sequence[Gateway], postgres: Server, most: float) -> dict[str, float]:
+    """Waits until no sink is behind by more than what comes in a few seconds.
+
+    How long that took, and how old meanwhile the newest sample in PostgreSQL was at most, in seconds.
+    """
+    begun, oldest = time.monotonic(), 0.0
     while time.monotonic() < begun + most:
         outlets = [each for of in gateways for each in status(of.folder).get("outlets", {}).values()]
         sinks = [each for each in outlets if "behind" in each]
         if len(sinks) >= 2 * len(gateways) and all(each["connected"] and each["behind"] < 2_000 for each in sinks):
             break
+        [(age,)] = postgres.ask(NEWEST)
+        oldest = max(oldest, float(age))
         time.sleep(0.5)
-    return time.monotonic() - begun
+    return {"caught_up_s": time.monotonic() - begun, "newest_at_most_s": oldest}
+
+
+def fill(folder: Path, drives: Sequence[str], samples: int) -> None:
+    """*samples* of each drive, that wait: one every ten seconds, until an hour ago."""
+    profile = Profile.find("gd350")
+    names = profile.monitor_names()
+    rows = [profile.describe(name) for name in names]
+    digits = tuple(digits_of(row.scale) for row in rows)
+    layouts = [Layout(name, "gd350", tuple(names), tuple(row.unit for row in rows), digits) for name in drives]
+    with Spool(folder / "drivebus-spool", 2_000_000_000, print) as spool:
+        for number in range(samples):
+            at = time.time() - 3_600.0 - 10.0 * (samples - number)
+            for layout in layouts:
+                spool.add(layout, at, 0.02, "", [number % 50] * len(names))
+            if number % 100 == 0:
+                spool.commit()
 
 
 def kept_by(folder: Path) -> Iterator[Spooled]:
@@ -241,25 +269,29 @@ def compared(
     }
 
 
-def measure(number: int, count: int, drives: int, minutes: float, away: float, kills: int) -> dict[str, float]:
-    """One run with a *number* of gateways; what came of it."""
+def measure(given: argparse.Namespace) -> dict[str, float]:
+    """One run; what came of it."""
+    number, drives = given.gateways, given.drives
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="drivebus-plant-")))
-        ports = stack.enter_context(lines(count, drives))
+        ports = stack.enter_context(lines(given.lines, drives))
         postgres = stack.enter_context(server())
         mosquitto = stack.enter_context(broker(folder, KEPT))
         listener = stack.enter_context(closing(Listener(mosquitto.port)))
         historian = Historian(mosquitto.port)
-        metrics = free_port() if number == 1 else 0
+        metrics = 0 if given.without_sparkplug or number > 1 else free_port()
         gateways: list[Gateway] = []
         for which in range(number):
             place = folder / str(which)
             place.mkdir()
             told = file_of(ports[which::number], drives, postgres, mosquitto.port, f"gateway{which}", metrics)
             (place / "drivebus.toml").write_text(told)
+            if given.backlog:
+                mine = [f"d{line}-{unit}" for line in range(len(ports[which::number])) for unit in range(1, drives + 1)]
+                fill(place, mine, given.backlog)
             gateways.append(Gateway(place))
-        figures = befall(gateways, postgres, mosquitto, metrics, minutes, away, kills)
-        figures["caught_up_s"] = until_all_is_in(gateways, 900.0)
+        figures = befall(gateways, postgres, mosquitto, metrics, given)
+        figures |= until_all_is_in(gateways, postgres, 1_800.0)
         figures["lost"] = sum(status(each.folder)["spool"]["lost"] for each in gateways)
         figures["memory_mb"] = max(max(each.memory) for each in gateways) / 1e6
         for each in gateways:
@@ -287,13 +319,15 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--away", type=float, default=10.0, help="minutes for which each server is away")
     parser.add_argument("--kills", type=int, default=20, help="of the gateway, with -9, at random moments")
+    parser.add_argument("--backlog", type=int, default=0, help="samples of each drive that wait before")
+    parser.add_argument("--without-sparkplug", action="store_true")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--simulate", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.simulate:
         simulate(given.lines, given.drives)
         return
-    figures = measure(given.gateways, given.lines, given.drives, given.minutes, given.away, given.kills)
+    figures = measure(given)
     table = markdown(["figure", "value"], [[name, f"{value:,.4g}"] for name, value in figures.items()])
     show(given.json, figures, table)
 
