@@ -72,7 +72,7 @@ def test_each_view_has_what_it_is_for(simulator: Simulator, tmp_path: Path, size
         terminal.until("4 drives")
         terminal.press("\x1b[H", "\r")
         terminal.until("1 of 4", "fault, OV3", "cause: ", "remedy: ", "○ S1", "up to 50.00")
-        terminal.until("of the last 10 exchanges brought an answer; 0 silent, 0 damaged")
+        terminal.until("of the last 10 exchanges brought an answer; 0 silent, ")
         # A fault with all that is known of it pushes nothing out.
         terminal.until(lambda _: terminal.lines[-1].startswith("Space STOP"))
         keep("drive", terminal.lines, size)

@@ -91,6 +91,8 @@ struct State {
     own: BTreeMap<u64, Left>,
     tokens: u64,
     halting: BTreeMap<UnitAddress, Halted>,
+    /// How many halts that are done are being told of.
+    telling: usize,
     /// How many wills of programs that live were seen at last.
     living: usize,
     /// Until when it is looked often.
@@ -391,7 +393,7 @@ impl Wills {
     pub(super) fn let_out(&self) {
         let end = monotonic() + LET_OUT;
         let mut state = self.lock();
-        while state.halting.values().any(|halted| halted.is_attended && !halted.course.is_late()) {
+        while state.telling > 0 || state.halting.values().any(|halted| halted.is_attended && !halted.course.is_late()) {
             let left = end.saturating_duration_since(monotonic());
             if left.is_zero() {
                 return;
@@ -488,6 +490,7 @@ impl Wills {
                 format!("unit {unit} was not told to halt: {who}, and another drive answers at its address now")
             });
         }
+        state.telling += 1;
         drop(state);
         for Left { paper, then, .. } in wills {
             if let Some(paper) = paper {
@@ -497,6 +500,7 @@ impl Wills {
                 then(took);
             }
         }
+        self.lock().telling -= 1;
         self.changed.notify_all();
     }
 
