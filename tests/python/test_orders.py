@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import random
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -35,7 +36,12 @@ class Plant:
         self.now = 0.0
         self.simulator = simulator
         self.events = Events(lambda _: None, None)
-        self.orders = Orders(Site.load(file).drives, self.events, lambda: self.now)
+        self.on_clock: Callable[[float], object] = bool
+        self.orders = Orders(Site.load(file).drives, self.events, self.clock)
+
+    def clock(self) -> float:
+        self.on_clock(self.now)
+        return self.now
 
     @contextmanager
     def line(self) -> Iterator[drivebus.Bus]:
@@ -132,16 +138,42 @@ def test_a_line_that_is_away_takes_no_order(plant: Plant) -> None:
 
 def test_a_stop_overtakes_a_start_and_one_motor_waits_for_no_other(plant: Plant) -> None:
     with plant.line():
-        starting = threading.Thread(target=plant.give, args=("run",), kwargs={"hz": 10.0})
+        accepted, go_on = threading.Event(), threading.Event()
+        times = itertools.count()
+
+        def hold(_: object) -> None:
+            # At its second look at the clock it has been at the drive, and is about to start it.
+            if threading.current_thread() is starting and next(times) == 1:
+                accepted.set()
+                go_on.wait()
+
+        plant.on_clock = hold
+        given: list[tuple[str, str]] = []
+        starting = threading.Thread(target=lambda: given.append(plant.give("run", hz=10.0)))
         starting.start()
+        accepted.wait()
         assert plant.give("stop", "fan") == ("done", "")
         assert plant.give("stop") == ("done", "")
+        go_on.set()
         starting.join()
-        # Wherever the stop met the start: behind it nothing turns.
-        assert plant.told()[-1] == STOP
-        with drivebus.Bus(plant.simulator.port, baudrate=115200) as other:
-            other.drive(1, "gd350").wait_until_stopped()
+        assert given == [("not sent", "it was told to halt meanwhile")]
+        assert plant.told() == [STOP]
         assert plant.told(2) == [STOP]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_stop_at_any_moment_of_a_start_is_the_last_word(plant: Plant, seed: int) -> None:
+    with plant.line():
+        begun = threading.Event()
+        plant.on_clock = lambda _: begun.set()
+        starting = threading.Thread(target=plant.give, args=("run",), kwargs={"hz": 10.0})
+        starting.start()
+        begun.wait()
+        threading.Event().wait(random.Random(seed).random() * 0.05)
+        assert plant.give("stop")[0] == "done"
+        starting.join()
+        assert plant.told()[-1] == STOP
+        assert plant.orders.started_by("page") == []
 
 
 def test_all_are_stopped_side_by_side(plant: Plant) -> None:

@@ -97,6 +97,8 @@ class _Charge:
     halts: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(_AT_ONCE))
     door: str = ""
     """Whose door it was set in motion by."""
+    halted: object = None
+    """Another one each time that it is told to halt."""
 
 
 class Orders:
@@ -172,6 +174,7 @@ class Orders:
             if charge is None or charge.door != door or not charge.motor.may_turn:
                 return
             try:
+                charge.halted = object()
                 self._halt(charge, "stop")
             except DrivebusError as error:
                 self._events.note(name, "order", f"not halted yet: {error}")
@@ -190,8 +193,11 @@ class Orders:
         charge = self._charges.get(order.drive)
         if charge is None:
             return Outcome("not sent", self._why_away(order.drive))
+        before = charge.halted
         try:
             if order.what in HALTS:
+                # Whatever waits, and was ordered before, is not sent any more.
+                charge.halted = object()
                 with _if_free(charge.halts) as is_free:
                     if not is_free:
                         return Outcome("may have been done", "it is being told already, and has not answered yet")
@@ -199,7 +205,13 @@ class Orders:
             else:
                 with charge.lock:
                     self._in_time(charge, until)
+                    if charge.halted is not before:
+                        raise NotAllowed("it was told to halt meanwhile")
                     self._do(charge, order, door)
+                    if order.what == "run" and charge.halted is not before:
+                        # The halt may have come just before the start was sent.
+                        charge.motor.stop()
+                        raise NotAllowed("it was told to halt meanwhile, and was stopped once more")
         except Refused as error:
             return Outcome("may have been done" if error.may_have_taken else "refused", str(error))
         except DrivebusError as error:
