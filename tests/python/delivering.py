@@ -98,7 +98,13 @@ def _deliver(conninfo: str, schema: str, path: Path) -> None:
     with Spool(path, SIZE, quiet) as spool, Postgres(spool, PostgresSettings(conninfo, "killed", schema), quiet):
         for _ in count():
             feed(spool, _AT_ONCE)
-            print("committed", flush=True)
+            _say("committed")
+
+
+def _say(line: str) -> None:
+    """In one write: a kill leaves all of the line or nothing of it, however Python was told to buffer."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
 
 
 def main() -> None:
@@ -109,12 +115,12 @@ def main() -> None:
         child = os.fork()
         if child == 0:
             try:
+                _say(str(os.getpid()))
                 _deliver(sys.argv[1], sys.argv[2], Path(sys.argv[3]))
             finally:
                 os._exit(1)
-        print(child, flush=True)
         os.waitpid(child, 0)
-        print("ended", flush=True)
+        _say("ended")
 
 
 if __name__ == "__main__":
