@@ -16,6 +16,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, cast
 
 import pytest
@@ -344,6 +345,30 @@ def test_a_forked_child_keeps_nothing_open(bus: Bus) -> None:
         finally:
             with contextlib.suppress(OSError):
                 os.close(go)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse once the last copy is closed")
+def test_closing_refuses_clients_though_a_copy_of_the_door_is_open(bus: Bus) -> None:
+    gateway = Gateway(bus, HERE)
+    # As a forked child has it, before it has run at all.
+    with socket.socket(fileno=os.dup(door_of(gateway))) as copy:
+        gateway.close()
+        with pytest.raises(ConnectionRefusedError):
+            connected(gateway)
+        with Gateway(bus, gateway.address) as again, connected(again) as client:
+            client.sendall(request(1, 1, b"\x03\x21\x03\x00\x01"))
+            assert answer(client) == (1, 1, b"\x03\x02\x01\xa0")
+        assert copy.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN) == 0
+
+
+def door_of(gateway: Gateway) -> int:
+    """The descriptor at which *gateway* listens."""
+    for number in (int(each.name) for each in Path("/proc/self/fd").iterdir()):
+        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(number)) as one:
+            listens = one.family == socket.AF_INET and one.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
+            if listens and "{}:{}".format(*one.getsockname()) == gateway.address:
+                return number
+    raise AssertionError(gateway.address)
 
 
 def send_for_ever(client: socket.socket, asks: bytes) -> None:

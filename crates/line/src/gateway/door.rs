@@ -55,8 +55,16 @@ pub(super) struct TcpDoor {
 }
 
 impl TcpDoor {
-    /// Lets clients in until it is closed and somebody knocks.
+    /// Lets clients in until it is closed and somebody knocks; nobody is let in then, though a child that is being forked has
+    /// the door still open.
     pub(super) fn stand(&self) {
+        self.let_in_while_open();
+        // Linux refuses clients from here on, whoever has a copy; other systems do when the last copy is closed.
+        #[cfg(unix)]
+        let _ = rustix::net::shutdown(&*self.listener, rustix::net::Shutdown::Both);
+    }
+
+    fn let_in_while_open(&self) {
         while !self.is_closed.load(Ordering::Acquire) {
             let served = match self.listener.accept() {
                 Ok(_) if self.is_closed.load(Ordering::Acquire) => return,
