@@ -14,7 +14,8 @@ import pytest
 import drivebus
 from drivebus import Simulator
 from drivebus.service.events import Events
-from drivebus.service.orders import HALTS, ORDERS, Door, Order, Orders
+from drivebus.service.orders import Door, Order, Orders
+from drivebus.sinks.order_words import HALTS, ORDERS
 from drivebus.site import Site
 
 from .plant_text import HALL, drive

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
-from drivebus.service.orders import HALTS, Door, Order, Outcome
+from drivebus.service.orders import Door, Order, Outcome
+from drivebus.sinks.order_words import HALTS
 
 __all__ = ["Dispatch"]
 

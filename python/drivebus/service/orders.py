@@ -18,14 +18,10 @@ from drivebus.errors import DrivebusError, NotAllowed, Refused
 from drivebus.motor import Motor
 from drivebus.service.events import Events
 from drivebus.service.handles import handle_of
+from drivebus.sinks.order_words import HALTS, ORDERS
 from drivebus.site import SiteDrive
 
-__all__ = ["HALTS", "ORDERS", "Door", "Order", "Orders", "Outcome", "Result"]
-
-ORDERS = ("run", "setpoint", "reset", "stop", "coast")
-"""What a drive can be told."""
-HALTS = ("stop", "coast")
-"""Those that halt: whoever may tell a drive anything may tell it this, and it goes before all else."""
+__all__ = ["Door", "Order", "Orders", "Outcome", "Result"]
 
 _AT_ONCE = 2
 """So many halts of one drive are under way at a time. A drive that is silent is told for seconds, before all others on

@@ -5,41 +5,15 @@ None of them can hold a line up, and what goes wrong in one is told, and tried a
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Protocol
 
-from drivebus.service.events import Events
 from drivebus.service.listening import Listening
 from drivebus.service.mistakes import settings_of, sparkplug_settings_of
-from drivebus.service.orders import Orders
 from drivebus.service.over_mqtt import OverMqtt
-from drivebus.sinks import Picture, Postgres, Prometheus, Sparkplug
-from drivebus.site import Site
-from drivebus.spool import Spool
+from drivebus.service.plant import Plant
+from drivebus.sinks import Postgres, Prometheus, Sparkplug
 
-__all__ = ["Outlet", "Plant", "outlets_of"]
-
-
-@dataclass(frozen=True)
-class Plant:
-    """A plant, as outlets see it.
-
-    Attributes:
-        site: What its file says.
-        look: Gives how it is now. Any thread.
-        spool: Where samples and events wait, if they do.
-        events: What happened.
-        orders: What drives can be told.
-        tell: Hears in words what people should know.
-    """
-
-    site: Site
-    look: Callable[[], Picture]
-    spool: Spool | None
-    events: Events
-    orders: Orders
-    tell: Callable[[str], None]
+__all__ = ["Outlet", "outlets_of"]
 
 
 class Outlet(Protocol):
@@ -64,7 +38,7 @@ def outlets_of(plant: Plant) -> dict[str, Outlet]:
     if site.postgres is not None and plant.spool is not None:
         found["postgres"] = _Delivering(Postgres(plant.spool, settings_of(site.postgres), plant.tell))
     if site.mqtt is not None:
-        found["mqtt"] = OverMqtt(site, site.mqtt, plant.look, plant.spool, plant.events, plant.orders, plant.tell)
+        found["mqtt"] = OverMqtt(plant, site.mqtt)
     if site.sparkplug is not None and plant.spool is not None:
         node = Sparkplug(plant.spool, sparkplug_settings_of(site.sparkplug), plant.look, plant.tell)
         found["sparkplug"] = _Delivering(node)
@@ -80,7 +54,7 @@ def outlets_of(plant: Plant) -> dict[str, Outlet]:
         # Not for who has none: what it is made of takes time to load.
         from drivebus.service.page import Page
 
-        found["web"] = Page(site, site.web, plant.look, plant.spool, plant.events, plant.orders, plant.tell)
+        found["web"] = Page(plant, site.web)
     return found
 
 

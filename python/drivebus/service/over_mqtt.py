@@ -18,11 +18,12 @@ from drivebus.profile.evidence import Evidence
 from drivebus.service.dispatch import Dispatch
 from drivebus.service.events import Events
 from drivebus.service.mistakes import evidence_of, mqtt_settings_of
-from drivebus.service.orders import ORDERS, Door, Order, Orders, Outcome
+from drivebus.service.orders import Door, Order, Orders, Outcome
+from drivebus.service.plant import Plant
 from drivebus.service.polling import layout_of
-from drivebus.sinks import Answer, Command, Commander, Mqtt, MqttDrive, MqttValue, Picture
-from drivebus.site import Site, SiteDrive, SiteMqtt, SitePoll
-from drivebus.spool import Spool
+from drivebus.sinks import Answer, Command, Commander, Mqtt, MqttDrive, MqttValue
+from drivebus.sinks.order_words import ORDERS
+from drivebus.site import SiteDrive, SiteMqtt, SitePoll
 from drivebus.values import digits_of
 
 __all__ = ["OverMqtt", "drive_of"]
@@ -40,32 +41,19 @@ class OverMqtt:
     """What a service has at a broker.
 
     Args:
-        site: What its file says.
-        told: What that says of MQTT.
-        look: Gives how the plant is now. Any thread.
-        spool: Where samples wait, if they do.
-        events: Hears of what is refused.
-        orders: What drives can be told.
-        tell: Hears in words what people should know.
+        plant: What is told there, and may be ordered.
+        told: What its file says of MQTT.
     """
 
-    def __init__(
-        self,
-        site: Site,
-        told: SiteMqtt,
-        look: Callable[[], Picture],
-        spool: Spool | None,
-        events: Events,
-        orders: Orders,
-        tell: Callable[[str], None],
-    ) -> None:
+    def __init__(self, plant: Plant, told: SiteMqtt) -> None:
+        site = plant.site
         drives = [drive_of(drive, site.polls, told.may.get(name, frozenset())) for name, drive in site.drives.items()]
         commander = None
         self._over = threading.Event()
         if told.may:
-            watch = _Watch(told.may, told.dead_man, events, orders, self._over.is_set)
+            watch = _Watch(told.may, told.dead_man, plant.events, plant.orders, self._over.is_set)
             commander = Commander(watch.give, watch.not_taken, watch.depends, watch.silent)
-        self._mqtt = Mqtt(mqtt_settings_of(told), drives, look, spool, commander, tell)
+        self._mqtt = Mqtt(mqtt_settings_of(told), drives, plant.look, plant.spool, commander, plant.tell)
         self.start = self._mqtt.start
 
     def turn(self) -> None:

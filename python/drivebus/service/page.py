@@ -7,21 +7,20 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from drivebus.errors import NotAllowed
 from drivebus.operations import network_rights
 from drivebus.operations.last_will import WAYS
-from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
-from drivebus.service.events import Events
 from drivebus.service.listening import Listening
-from drivebus.service.orders import ORDERS, Door, Order, Orders
-from drivebus.sinks import Picture
+from drivebus.service.mistakes import evidence_of
+from drivebus.service.orders import Door, Order
+from drivebus.service.plant import Plant
+from drivebus.sinks.order_words import ORDERS
 from drivebus.site import Site, SiteDrive, SitePoll, SiteWeb
-from drivebus.spool import Spool
 from drivebus.web import Happened, Person, Presence, Shown, ShownDrive, Told, Web, web_context
 
 __all__ = ["Page", "shown_drives"]
@@ -36,29 +35,14 @@ class Page:
     """The page.
 
     Args:
-        site: What the file says.
-        told: What it says of the page.
-        look: Gives how the plant is now. Any thread.
-        spool: Where samples are kept, if they are.
-        events: What happened.
-        orders: What drives can be told.
-        tell: Hears in words what people should know.
+        plant: What it shows, and what may be ordered there.
+        told: What the file says of the page.
     """
 
-    def __init__(
-        self,
-        site: Site,
-        told: SiteWeb,
-        look: Callable[[], Picture],
-        spool: Spool | None,
-        events: Events,
-        orders: Orders,
-        tell: Callable[[str], None],
-    ) -> None:
-        self._site, self._told, self._look = site, told, look
-        self._spool, self._events, self._orders, self._tell = spool, events, orders, tell
-        self._drives = shown_drives(site)
-        self._people = [Person(each.name, each.password, each.role) for each in site.people]
+    def __init__(self, plant: Plant, told: SiteWeb) -> None:
+        self._plant, self._told, self._orders = plant, told, plant.orders
+        self._drives = shown_drives(plant.site)
+        self._people = [Person(each.name, each.password, each.role) for each in plant.site.people]
         may = {name: each.may for name, each in self._drives.items() if each.may}
         self._doors = {
             each.name: Door(f"the page of {each.name}", may) for each in self._people if each.role == "command"
@@ -73,7 +57,7 @@ class Page:
             "web",
             f"the page is at {'http' if self._context is None else 'https'}://{told.address}/",
             self._listen,
-            tell,
+            plant.tell,
         )
 
     def start(self) -> None:
@@ -87,7 +71,7 @@ class Page:
                 why = f"gave no sign of life for {self._dead_man:g} s"
                 self._orders.shut(self._doors[person].name, why, lambda: self._is_over)
         if self._web is not None and not self._web.serves:
-            self._tell("web: the page broke down, and is begun again")
+            self._plant.tell("web: the page broke down, and is begun again")
             self._listening.close()
         self._listening.turn()
 
@@ -101,20 +85,21 @@ class Page:
         return self._listening.status()
 
     def _listen(self) -> Web:
+        plant = self._plant
         shown = Shown(
             title=platform.node() or "drivebus",
             drives=self._drives,
             people=self._people,
-            look=self._look,
-            events=lambda: [Happened(*each) for each in self._events.last()],
+            look=plant.look,
+            events=lambda: [Happened(*each) for each in plant.events.last()],
             order=self._order,
             stop_all=self._stop_all,
             started=self._started,
             here=self._here,
-            tell=self._tell,
+            tell=plant.tell,
             dead_man=self._dead_man,
-            spool=None if self._spool is None else self._spool.path,
-            audit=self._site.share.audit,
+            spool=None if plant.spool is None else plant.spool.path,
+            audit=plant.site.share.audit,
         )
         self._web = Web(self._told.address, self._told.hosts, self._context, shown)
         return self._web
@@ -151,13 +136,10 @@ def _shown(drive: SiteDrive, polls: tuple[SitePoll, ...]) -> ShownDrive:
     if drive.profile is None:
         return replace(here, why_not="the file names no profile of it")
     try:
-        profile = Profile.find(drive.profile)
-        known = Evidence(
-            profile.with_variants(drive.variants) if drive.variants else profile, drive.unit, drive.unverified
-        )
+        known = evidence_of(drive)
     except NotAllowed as error:
         return replace(here, why_not=str(error))
-    here = replace(here, family=profile.title)
+    here = replace(here, family=known.profile.title)
     if drive.read_only:
         return replace(here, why_not="it is read_only in the file")
     halts = {way for way in WAYS if known.unusable(way) is None}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import ipaddress
 import os
 import re
 from collections.abc import Iterator
 from importlib.util import find_spec
 
 from drivebus.errors import NotAllowed
+from drivebus.sinks.this_computer import is_loopback
 from drivebus.site import Site, SiteWeb
 from drivebus.web import web_context
 
@@ -42,7 +42,7 @@ def of_page(site: Site) -> Iterator[tuple[int, str]]:
 
 def _of_address(web: SiteWeb) -> Iterator[tuple[int, str]]:
     at, host = web.lines["address"], web.address.rpartition(":")[0].strip("[]")
-    if web.certificate is None and not _is_loopback(host):
+    if web.certificate is None and not is_loopback(host.lower()):
         yield (
             at,
             f"passwords and orders would cross the network unencrypted: say certificate and key, or an address of this "
@@ -66,10 +66,3 @@ def _of_certificate(web: SiteWeb) -> Iterator[tuple[int, str]]:
         else:
             if os.name == "posix" and web.key.stat().st_mode & 0o007:
                 yield web.lines["key"], f"everybody on this computer can read {web.key}: chmod o= {web.key}"
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return host.lower() == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False

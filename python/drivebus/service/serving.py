@@ -20,7 +20,8 @@ from drivebus.service.handles import handle_of
 from drivebus.service.mistakes import check
 from drivebus.service.notify import notify, watchdog_interval
 from drivebus.service.orders import Orders
-from drivebus.service.outlets import Plant, outlets_of
+from drivebus.service.outlets import outlets_of
+from drivebus.service.plant import Plant
 from drivebus.service.polling import Polling
 from drivebus.service.status import StatusFile
 from drivebus.sinks import GatewayPicture, LinePicture, Picture

@@ -13,6 +13,7 @@ from drivebus.sinks.mqtt_drives import MqttDrive, MqttValue
 from drivebus.sinks.mqtt_messages import packed
 from drivebus.sinks.mqtt_present import OFFLINE, ONLINE, REPEATS
 from drivebus.sinks.mqtt_topics import Topics
+from drivebus.sinks.order_words import HALTS
 
 __all__ = ["born", "configs", "filter_of"]
 
@@ -85,7 +86,7 @@ def _entities(drive: MqttDrive, topics: Topics) -> Iterator[tuple[str, str, dict
     else:
         both = {"availability": [here], "availability_mode": "all"}
     for order, key, name, icon, words in _BUTTONS:
-        if order in drive.may or (drive.may and order in ("stop", "coast")):
+        if order in drive.may or (drive.may and order in HALTS):
             told = {"name": name, "icon": icon, "command_topic": topics.order(drive.name, order), "qos": 1}
             yield "button", key, {**both, **told, "command_template": "{" + words + "}"}
     if "setpoint" in drive.may and drive.highest:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from drivebus import checks
-from drivebus.errors import NotAllowed
 from drivebus.sinks import home_assistant
 from drivebus.sinks.delivery import Delivery
 from drivebus.sinks.mqtt_commands import Command, Commands, Heard, NotTaken
@@ -23,6 +22,7 @@ from drivebus.sinks.mqtt_messages import Message, moment, packed
 from drivebus.sinks.mqtt_present import OFFLINE, ONLINE, Present
 from drivebus.sinks.mqtt_settings import MqttSettings
 from drivebus.sinks.mqtt_topics import Topics, why_no_prefix
+from drivebus.sinks.needs_paho import module_for
 from drivebus.sinks.picture import Picture
 from drivebus.spool import Spool
 
@@ -308,8 +308,4 @@ def _shown(drives: Sequence[MqttDrive], settings: MqttSettings) -> dict[str, Mes
 
 def _paho() -> ModuleType:
     """What needs paho-mqtt."""
-    try:
-        from drivebus.sinks import mqtt_link
-    except ImportError:
-        raise NotAllowed("MQTT needs paho-mqtt: pip install 'drivebus[mqtt]'") from None
-    return mqtt_link
+    return module_for("MQTT", "mqtt_link")

@@ -13,6 +13,7 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from drivebus import checks
+from drivebus.sinks.order_words import HALTS
 
 __all__ = ["Command", "Commands", "Heard", "NotTaken"]
 
@@ -28,7 +29,6 @@ _LONGEST_ID = 100
 _LATEST = 1e11
 """Seconds. No clock shows such a Unix time; milliseconds are above it."""
 _KEYS = {"run": ("hz", "reverse"), "setpoint": ("hz",)}
-_HALTS = ("stop", "coast")
 
 
 class Heard(NamedTuple):
@@ -106,7 +106,7 @@ class Commands:
         named = _id(said)
         try:
             left, is_known = _left(heard, said, wall)
-            if not is_known and not named and heard.order not in _HALTS:
+            if not is_known and not named and heard.order not in HALTS:
                 raise NotTaken('it has neither a "time" nor an "id", so that it cannot be told from the one before')
             command = Command(heard.drive, heard.order, named, _hz(said), _reverse(said), left)
             self._take_once((heard.drive, named) if named else (heard.drive, heard.order, heard.payload), now, said)
@@ -128,7 +128,7 @@ class Commands:
 
 
 def _said(heard: Heard) -> dict[str, Any]:
-    if not heard.payload and heard.order in _HALTS:
+    if not heard.payload and heard.order in HALTS:
         return {}
     try:
         said = json.loads(heard.payload.decode(), parse_constant=_no_number, object_pairs_hook=_once)
@@ -190,7 +190,7 @@ def _left(heard: Heard, said: dict[str, Any], wall: float) -> tuple[float, bool]
                 raise NotTaken(f"it may be delivered for {heard.expiry:g} s, and a command for {OLDEST:g} s at most")
         else:
             left = heard.expiry
-    elif "time" not in said and heard.order not in _HALTS:
+    elif "time" not in said and heard.order not in HALTS:
         raise NotTaken('it does not say when it was given: say "time", or let it expire')
     if "time" not in said:
         return left, False

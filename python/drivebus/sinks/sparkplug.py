@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-from drivebus.errors import NotAllowed
 from drivebus.sinks.delivery import Delivery
+from drivebus.sinks.needs_paho import module_for
 from drivebus.sinks.picture import Picture
 from drivebus.sinks.sparkplug_settings import SparkplugSettings
 from drivebus.spool import Spool
@@ -61,7 +60,4 @@ class Sparkplug:
 
 def _module(name: str) -> ModuleType:
     """The module called *name*, which needs paho-mqtt."""
-    try:
-        return import_module(f"drivebus.sinks.{name}")
-    except ImportError:
-        raise NotAllowed("Sparkplug needs paho-mqtt: pip install 'drivebus[mqtt]'") from None
+    return module_for("Sparkplug", name)

@@ -25,10 +25,8 @@ from drivebus.site.broker import BROKER_KEYS, SiteBroker, broker_of, that
 from drivebus.site.entries import SiteDrive, drives_named
 from drivebus.site.reading import Key, Reading, dead_man_of, listed, one_of, text
 
-__all__ = ["COMMANDS", "SiteMqtt", "SiteMqttAllow", "mqtt_of"]
+__all__ = ["SiteMqtt", "SiteMqttAllow", "mqtt_of"]
 
-COMMANDS = ("run", "setpoint", "reset")
-"""What may be allowed. Who may do any of it may stop, too."""
 _DEAD_MAN = (1.0, 3600.0)
 """Seconds."""
 _KEYS = (*BROKER_KEYS, "gateway", "topic", "home_assistant", "dead_man", "allow")
@@ -40,7 +38,7 @@ class SiteMqttAllow:
 
     Attributes:
         drives: The drives.
-        commands: Of `COMMANDS`.
+        commands: Of `order_words.MOVES`. Who may do any of it may stop, too.
         lines: In which line of the file each key stands, and the table itself by an empty name.
     """
 
@@ -110,10 +108,12 @@ def _allow(
     drives: Mapping[str, SiteDrive],
     groups: Mapping[str, tuple[SiteDrive, ...]],
 ) -> SiteMqttAllow:
+    from drivebus.sinks.order_words import MOVES
+
     keys = ("drives", "commands")
     file.check_keys(table, keys, where)
     names = file.value(where, table, "drives", listed(text, '["pump1"]'), needed=True) or []
-    commands = file.value(where, table, "commands", listed(one_of(*COMMANDS), '["run"]'), needed=True) or []
+    commands = file.value(where, table, "commands", listed(one_of(*MOVES), '["run"]'), needed=True) or []
     chosen = drives_named(names, drives, groups, file, (*where, "drives"))
     at = {key: file.line_of((*where, key)) for key in keys if key in table} | {"": file.line_of(where)}
     return SiteMqttAllow(chosen, tuple(commands), at)

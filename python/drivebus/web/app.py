@@ -26,6 +26,7 @@ from starlette.responses import (
 )
 from starlette.routing import Route
 
+from drivebus.sinks.order_words import HALTS, MOVES
 from drivebus.spool.history import history_of
 from drivebus.web.audit import tail
 from drivebus.web.live import Live
@@ -46,9 +47,6 @@ _WITHIN = 2.0
 """Seconds after which an order that still waits is not sent."""
 _READERS = 50
 """So many wait for a curve."""
-_MOVES = ("run", "setpoint", "reset")
-"""What is ordered once, and at a picture that is fresh. A halt always goes."""
-_HALTS = ("stop", "coast")
 
 
 class Routes:
@@ -231,11 +229,12 @@ class Routes:
         drive = self._shown.drives.get(form.get("drive", ""))
         if drive is None:
             return "not sent", "there is no such drive"
-        if what in _MOVES:
+        if what in MOVES:
+            # These are ordered once, and at a picture that is fresh. A halt always goes.
             why = self._tickets.why_not(form.get("number", ""), form.get("seen", ""), time.time())
             if why:
                 return "not sent", why
-        elif what not in _HALTS:
+        elif what not in HALTS:
             return "not sent", "there is no such order"
         hertz: float | None = None
         if what in ("run", "setpoint"):
@@ -252,7 +251,7 @@ class Routes:
             _address(request),
             time.monotonic() + _WITHIN,
         )
-        pool = self._halting if what in _HALTS else self._ordering
+        pool = self._halting if what in HALTS else self._ordering
         return await asyncio.get_running_loop().run_in_executor(pool, self._shown.order, told)
 
     def _known(self, request: Request) -> ShownDrive:
