@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import threading
@@ -84,6 +85,10 @@ class Broker:
         """It is gone without a word."""
         self._process.kill()
         self._process.wait(60)
+
+    def reload(self) -> None:
+        """Has it read anew who may say what. It has to have served somebody: before that it would end."""
+        self._process.send_signal(signal.SIGHUP)
 
     def _takes(self) -> bool:
         assert self._process.poll() is None, "the broker did not start"
