@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from contextlib import suppress
 
 __all__ = ["Latch"]
+
+_LOOKS = 0.5
+"""Seconds after which a wait looks for a signal that came just before it began to wait, and woke nobody."""
 
 
 class Latch:
@@ -36,9 +41,11 @@ class Latch:
         lock = threading.Lock()
         lock.acquire()
         self._waiting.append(lock)
+        until = math.inf if timeout is None else time.monotonic() + timeout
         # Who closes it from here on finds the lock.
-        if not self._is_set:
-            lock.acquire(timeout=-1 if timeout is None else timeout)
+        while not self._is_set and not lock.acquire(timeout=min(_LOOKS, max(until - time.monotonic(), 0.0))):
+            if time.monotonic() >= until:
+                break
         with suppress(ValueError):
             self._waiting.remove(lock)
         return self._is_set

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import signal
+import subprocess
 import sys
 import threading
 from collections.abc import Callable
@@ -13,6 +15,8 @@ from typing import Any
 import pytest
 
 from drivebus.latch import Latch
+
+from .conftest import NO_PTY
 
 
 def interrupted_at(moment: int, action: Callable[[], object]) -> bool:
@@ -60,6 +64,33 @@ def test_an_event_would_raise_something_else() -> None:
 
     with pytest.raises(RuntimeError, match="release unlocked lock"):
         wait_broken_off_everywhere()
+
+
+WAITS = """
+import signal, threading
+from drivebus.latch import Latch
+threading.Thread(target=threading.Event().wait, daemon=True).start()
+# The other thread takes the signal: the main thread has it to be served, and nothing wakes it, as when a signal comes
+# between its last look and its wait.
+signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+print("waits", flush=True)
+try:
+    Latch().wait()
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+
+
+@NO_PTY
+def test_a_signal_that_wakes_nobody_is_served_all_the_same() -> None:
+    with subprocess.Popen([sys.executable, "-c", WAITS], stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        try:
+            assert program.stdout.readline() == "waits\n"
+            program.send_signal(signal.SIGINT)
+            assert program.stdout.readline() == "interrupted\n"
+        finally:
+            program.kill()
 
 
 def test_a_latch_that_is_not_closed_in_time_says_so() -> None:
