@@ -14,6 +14,7 @@ from contextlib import closing, contextmanager
 from importlib import import_module
 from itertools import count
 from pathlib import Path
+from random import Random
 from typing import Any
 
 from drivebus.sinks import Postgres, PostgresSettings, delivery
@@ -21,7 +22,20 @@ from drivebus.spool import Layout, Reader, Spool
 
 from .postgres_server import Server, Way, until
 
-__all__ = ["LAYOUT", "SIZE", "Rows", "delivered", "delivering", "equal", "feed", "held", "is_in", "quiet", "quoted"]
+__all__ = [
+    "LAYOUT",
+    "SIZE",
+    "Rows",
+    "cut_afterwards",
+    "delivered",
+    "delivering",
+    "equal",
+    "feed",
+    "held",
+    "is_in",
+    "quiet",
+    "quoted",
+]
 
 Rows = dict[tuple[str, int], tuple[Any, ...]]
 
@@ -91,6 +105,17 @@ def equal(spool: Spool, postgres: Server, schema: str) -> None:
         assert delivered(postgres, schema) == held(reader)
     reached = postgres.ask(f"SELECT gateway, first, last FROM {quoted(schema)}.reached")
     assert reached == [("gateway 1", 1, spool.last)]
+
+
+@contextmanager
+def cut_afterwards(path: Path, chance: Random) -> Iterator[None]:
+    """The spool at *path* is closed in this block; then it is as it was before, but for the end of one of its files."""
+    kept = {each: each.read_bytes() for each in (path, path.with_name(f"{path.name}-wal"))}
+    yield
+    cut = chance.choice(list(kept))
+    kept[cut] = kept[cut][: chance.randrange(len(kept[cut]) + 1)]
+    for each, data in kept.items():
+        each.write_bytes(data)
 
 
 def _deliver(conninfo: str, schema: str, path: Path) -> None:

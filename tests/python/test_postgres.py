@@ -21,7 +21,20 @@ from drivebus.sinks import Postgres, PostgresSettings, delivery
 from drivebus.sinks.postgres_session import Session
 from drivebus.spool import Layout, Spool, Spooled
 
-from .delivering import LAYOUT, SIZE, Rows, delivered, delivering, equal, feed, held, is_in, quiet, quoted
+from .delivering import (
+    LAYOUT,
+    SIZE,
+    Rows,
+    cut_afterwards,
+    delivered,
+    delivering,
+    equal,
+    feed,
+    held,
+    is_in,
+    quiet,
+    quoted,
+)
 from .postgres_server import ROOT, Server, Way, server, until
 
 CHANCE = random.Random(1)
@@ -209,21 +222,17 @@ def test_a_program_that_is_killed_at_any_moment(quick_folder: Path, postgres: Se
 
 
 def test_a_spool_that_is_cut_anywhere(quick_folder: Path, postgres: Server, schema: str) -> None:
-    path, log = quick_folder / "spool", quick_folder / "spool-wal"
+    path = quick_folder / "spool"
     everything: Rows = {}
     for _ in range(100):
-        with Spool(path, SIZE, quiet) as spool, closing(spool.reader("test")) as reader:
-            feed(spool, 10)
-            with delivering(spool, postgres, schema):
-                pass
+        spool = Spool(path, SIZE, quiet)
+        feed(spool, 10)
+        with delivering(spool, postgres, schema), closing(spool.reader("test")) as reader:
             everything |= held(reader)
-            # These are not delivered, and may be there when it was cut.
-            feed(spool, 10)
-            kept = {each: each.read_bytes() for each in (path, log)}
-        cut = CHANCE.choice([path, log])
-        kept[cut] = kept[cut][: CHANCE.randrange(len(kept[cut]) + 1)]
-        for each, data in kept.items():
-            each.write_bytes(data)
+        # These are not delivered, and may be there when it was cut.
+        feed(spool, 10)
+        with cut_afterwards(path, CHANCE):
+            spool.close()
     assert delivered(postgres, schema) == everything
     assert len({epoch for epoch, _ in everything}) == 100
 

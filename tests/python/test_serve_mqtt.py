@@ -6,6 +6,7 @@ import subprocess
 import sys
 from contextlib import closing
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
@@ -17,6 +18,7 @@ from drivebus.sinks import Commander, Mqtt, MqttSettings, Picture
 from drivebus.site import Site
 from drivebus.spool import Spool
 
+from .delivering import SIZE, cut_afterwards, feed, held, quiet
 from .mqtt_broker import Broker, Somebody, Way, broker, somebody
 from .plant_text import HALL, drive, served
 from .tcp_client import seen
@@ -137,6 +139,35 @@ def test_nothing_is_lost_when_the_service_is_killed(tmp_path: Path) -> None:
         with served(file, heard) as service:
             seen(lambda: is_all_in(service))
     assert lacking_of(tmp_path / "drivebus-spool", ear) == []
+
+
+def test_a_spool_that_is_cut_anywhere(quick_folder: Path, tmp_path: Path) -> None:
+    """What it has is at the broker, and nothing that it never had."""
+    path, chance = quick_folder / "spool", Random(34)
+    has: set[tuple[str, int]] = set()
+    had: set[tuple[str, int]] = set()
+    with broker(tmp_path) as at, somebody(at) as ear:
+        settings = MqttSettings("127.0.0.1", at.port, "hall 1", tls=False)
+        for _ in range(100):
+            spool = Spool(path, SIZE, quiet)
+            with closing(spool.reader("test")) as reader:
+                feed(spool, 10)
+                has |= held(reader).keys()
+                mqtt = Mqtt(settings, [], lambda: Picture(0.0, ()), spool, None, quiet)
+                mqtt.start()
+                until_told(ear, has)
+                # Some of these are told, and all of them may be gone when it was cut.
+                feed(spool, 10)
+                had |= held(reader).keys()
+            with cut_afterwards(path, chance):
+                mqtt.close()
+                spool.close()
+    assert has <= set(numbers(ear)) <= had
+    assert len({epoch for epoch, _ in has}) == 100
+
+
+def until_told(ear: Somebody, wanted: set[tuple[str, int]]) -> None:
+    seen(lambda: wanted <= set(numbers(ear)))
 
 
 SERVES = """

@@ -27,6 +27,7 @@ from drivebus.sinks.sparkplug_payload import Metric, Payload
 from drivebus.sinks.sparkplug_settings import SparkplugSettings
 from drivebus.spool import Layout, Spool
 
+from .delivering import cut_afterwards
 from .mqtt_broker import Way, broker
 from .sparkplug_host import Host
 from .tcp_client import seen
@@ -93,9 +94,9 @@ class Plant:
     """A spool that is fed, and a node that tells of it."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
+        self.path = folder / "spool"
         self.heard: list[str] = []
-        self.spool = Spool(folder / "spool", 1 << 30, self.heard.append)
+        self.spool = Spool(self.path, 1 << 30, self.heard.append)
         self.last: dict[str, DrivePicture] = {}
         self._moments = count(1_700_000_000)
 
@@ -122,7 +123,12 @@ class Plant:
 
     def opened_again(self) -> None:
         self.spool.close()
-        self.spool = Spool(self.folder / "spool", 1 << 30, self.heard.append)
+        self.spool = Spool(self.path, 1 << 30, self.heard.append)
+
+    def kept(self) -> set[int]:
+        """The times of all samples with values that the spool has, in milliseconds."""
+        with closing(self.spool.reader("test")) as reader:
+            return {int(each.time * 1_000) for each in reader.after(0, 1_000_000) if each.values}
 
 
 @pytest.fixture(autouse=True)
@@ -161,9 +167,7 @@ def complete(plant: Plant, listener: Listener) -> None:
     host = listener.host
     present = Counter(at for device, at, _ in host.told if device == "pump")
     past = {at for device, at, _ in host.historical if device == "pump"}
-    with closing(plant.spool.reader("test")) as reader:
-        times = [int(each.time * 1_000) for each in reader.after(0, 1_000_000) if each.values]
-    assert [at for at in times if not present[at] and at not in past] == []
+    assert [at for at in plant.kept() if not present[at] and at not in past] == []
     assert not listener.wrong
 
 
@@ -235,6 +239,27 @@ def test_nothing_is_missing_whatever_befalls_the_broker(tmp_path: Path, plant: P
                 mends[befalls]()
                 seen(lambda: is_in(node))
         complete(plant, listener)
+
+
+def test_a_spool_that_is_cut_anywhere(tmp_path: Path, plant: Plant) -> None:
+    """What it has is told, as the present at most once."""
+    times: set[int] = set()
+    with broker(tmp_path) as served, listening(served.port) as listener:
+        for _ in range(100):
+            with plant.told(served.port) as node:
+                plant.feed(10)
+                times |= plant.kept()
+                seen(lambda: is_in(node) and not lacks(plant, listener))
+                # Some of these are told, and all of them may be gone when it was cut.
+                plant.feed(10)
+                with cut_afterwards(plant.path, CHANCE):
+                    node.close()
+                    plant.spool.close()
+            plant.opened_again()
+    told = Counter(at for _, at, _ in listener.host.told)
+    assert [at for at in times if not told[at] and at not in {at for _, at, _ in listener.host.historical}] == []
+    assert max(told.values()) == 1
+    assert not listener.wrong
 
 
 def lacks(plant: Plant, listener: Listener) -> bool:

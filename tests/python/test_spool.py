@@ -9,6 +9,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -160,6 +161,7 @@ def test_a_disk_that_takes_nothing_is_told_once_and_nothing_is_lost(quick_folder
 
 WRITES = """
 import sys
+from contextlib import closing
 from pathlib import Path
 from drivebus.spool import Layout, Spool
 layout = Layout("pump", "gd350", ("a",), ("",), (0,))
@@ -192,6 +194,24 @@ def test_what_was_committed_outlives_a_kill(quick_folder: Path) -> None:
             assert len(kept) >= last
             assert [each.values[0] for each in kept[had:]] == list(range(1, len(kept) - had + 1))
             had = len(kept)
+
+
+def test_nobody_has_what_comes_under_numbers_that_are_given_again(quick_folder: Path) -> None:
+    path, told = quick_folder / "spool", list[str]()
+    with Spool(path, 1 << 30, told.append) as spool:
+        for _ in range(20):
+            spool.add(PUMP, 100.0, 0.02, "", [0, 0, 0])
+        spool.commit()
+        spool.reached("a", 20)
+    # As a disk that keeps the one page and loses the other.
+    with closing(sqlite3.connect(path)) as base, base:
+        base.execute("DELETE FROM sample WHERE seq > 5")
+        base.execute("UPDATE sqlite_sequence SET seq = 5 WHERE name = 'sample'")
+    with Spool(path, 1 << 30, told.append) as spool:
+        spool.add(PUMP, 101.0, 0.02, "", [0, 0, 0])
+        spool.commit()
+        with closing(spool.reader("a")) as reader:
+            assert (reader.position(), spool.last) == (5, 6)
 
 
 def test_cut_anywhere_it_gives_what_is_whole(quick_folder: Path) -> None:

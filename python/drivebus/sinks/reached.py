@@ -22,15 +22,13 @@ class Reached:
     def __init__(self, spool: Spool, sink: str) -> None:
         self._spool = spool
         self._sink = sink
-        # A spool that lost its end gives numbers again, and these are not those that were delivered.
-        self._newest = spool.last
         self._inside: dict[str, Intervals] | None = None
 
     def open(self) -> Mapping[str, Intervals]:
         """What it has, by the names of the epochs."""
         if self._inside is None:
             with closing(self._spool.reader(self._sink)) as reader:
-                reached = min(reader.position(), self._newest)
+                reached = reader.position()
                 self._inside = {
                     each.epoch: Intervals([(each.first, min(each.last, reached))])
                     for each in reader.stretches()

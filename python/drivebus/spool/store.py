@@ -129,6 +129,8 @@ class Spool:
             "INSERT INTO epoch (name) VALUES (?) RETURNING number", (secrets.token_hex(8),)
         ).fetchall()
         self._last = int(self._base.execute("SELECT coalesce(max(seq), 0) FROM sample").fetchone()[0])
+        # A file that lost its end gives numbers again, and nobody has what comes under them.
+        self._base.execute("UPDATE position SET seq = min(seq, ?)", (self._last,))
         self._thread = threading.Thread(target=self._commit_always, name="drivebus spool", daemon=True)
         self._thread.start()
 
