@@ -93,7 +93,7 @@ def test_a_program_that_shares_the_port_is_told_the_same() -> None:
 def test_another_transaction_number_is_told(number: Callable[[int], int]) -> None:
     with (
         on_a_socket(good, mbap=True, number=number) as url,
-        drivebus.Bus(url, timeout=0.1) as bus,
+        drivebus.Bus(url, timeout=0.5) as bus,
     ):
         with pytest.raises(drivebus.BadAnswer, match="under another transaction number") as error:
             bus.read(1, 5)
