@@ -1,7 +1,7 @@
 """What Home Assistant is told of the drives of every family, held against what Home Assistant itself takes.
 
-`home_assistant.json` has the keys of its schemas, and the units and state classes of its device classes, as they were
-read out of its own modules.
+`home_assistant.json` has the keys of its schemas, and the units and state classes of its device classes, that an old
+version and a new one both take, as they were read out of their own modules.
 """
 
 from __future__ import annotations
