@@ -88,7 +88,23 @@ def test_without_psycopg_it_says_what_to_install(spool: Spool, monkeypatch: pyte
         Postgres(spool, PostgresSettings("", "gateway 1"), quiet)
 
 
-@given(st.lists(st.tuples(st.integers(1, 60), st.integers(0, 9))))
+SOME = st.lists(st.tuples(st.integers(1, 60), st.integers(0, 9)))
+
+
+@given(SOME, SOME)
+def test_what_is_removed_is_in_no_interval(added: list[tuple[int, int]], removed: list[tuple[int, int]]) -> None:
+    intervals, numbers = Intervals(), set[int]()
+    for first, length in added:
+        intervals.add(first, first + length)
+        numbers |= {*range(first, first + length + 1)}
+    for first, length in removed:
+        intervals.remove(first, first + length)
+        numbers -= {*range(first, first + length + 1)}
+    assert {number for first, last in intervals for number in range(first, last + 1)} == numbers
+    assert all(before + 1 < first for (_, before), (first, _) in pairwise(intervals))
+
+
+@given(SOME)
 def test_intervals_are_what_a_set_of_numbers_is(added: list[tuple[int, int]]) -> None:
     intervals, numbers = Intervals(), set[int]()
     written: list[tuple[int, int]] = []

@@ -38,6 +38,13 @@ class Intervals:
         self._all = sorted([*(each for each in self._all if each not in gone), come])
         return Change(gone, come)
 
+    def remove(self, first: int, last: int) -> None:
+        """None from *first* to *last* is in."""
+        left = [(begin, min(end, first - 1)) for begin, end in self._all]
+        right = [(max(begin, last + 1), end) for begin, end in self._all]
+        # One that reaches beyond on both sides leaves two, and one that is clear of it is the same twice.
+        self._all = sorted({(begin, end) for begin, end in left + right if begin <= end})
+
     def missing(self, first: int, last: int) -> Iterator[tuple[int, int]]:
         """The intervals between *first* and *last* that are not in."""
         for begin, end in self._all:

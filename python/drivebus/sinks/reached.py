@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 
 from drivebus.sinks.intervals import Intervals, runs
@@ -41,3 +41,9 @@ class Reached:
         assert self._inside is not None
         for epoch, first, last in runs(samples):
             self._inside.setdefault(epoch, Intervals()).add(first, last)
+
+    def give_back(self, lost: Iterable[tuple[str, int, int]]) -> None:
+        """It may not have these runs of numbers, by the names of their epochs."""
+        assert self._inside is not None
+        for epoch, first, last in lost:
+            self._inside.setdefault(epoch, Intervals()).remove(first, last)

@@ -2,7 +2,8 @@
 
 Values go at most once, as Sparkplug demands (QoS 0). So behind each part of them a subscription is made anew: the
 broker answers that behind all that came before, and what it has answered for is not sent again. What was sent, and
-never answered for, is sent again as the past.
+never answered for, is sent again as the past. So is what was sent shortly before the end of a session: a broker that
+dies takes with it what it had not given to the host, and a host is gone for a while before anybody knows.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import json
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing, suppress
 from typing import Any
@@ -18,7 +20,7 @@ import paho.mqtt.client as paho
 from paho.mqtt.enums import MQTTErrorCode
 
 from drivebus.errors import NotAllowed
-from drivebus.sinks.intervals import Intervals
+from drivebus.sinks.intervals import Intervals, runs
 from drivebus.sinks.mqtt_client import Client, cut, in_words, new_client, reason_of
 from drivebus.sinks.picture import Picture
 from drivebus.sinks.reached import Reached
@@ -36,6 +38,8 @@ _PATIENCE = 20.0
 """Seconds for a connection, and for each answer of the broker."""
 _HOST_FIRST, _HOST_LATER = 5.0, 600.0
 """Seconds for which the primary host is waited for: the first time, so that it is soon told, and from then on."""
+_IN_DOUBT = 60.0
+"""Seconds before the end of a session, of which nobody knows what the host has."""
 _LARGEST = 65_536
 """Bytes of a command or a state; what is larger is none."""
 
@@ -73,6 +77,8 @@ class Session:
         self._host: tuple[int, bool] = (0, False)
         self._patience = _HOST_FIRST
         self._is_over = False
+        self._lately: deque[tuple[float, list[tuple[str, int, int]]]] = deque()
+        self._ended_at = 0.0
 
     def open(self) -> Mapping[str, Intervals]:
         """Connects, waits for the primary host if there is one, and bears the node and all drives that answer."""
@@ -88,6 +94,10 @@ class Session:
         self._until_answered(client, topics)
         self._until_host_is_there()
         inside = self._reached.open()
+        while self._lately:
+            said_at, some = self._lately.popleft()
+            if said_at > self._ended_at - _IN_DOUBT:
+                self._reached.give_back(some)
         with self._lock:
             self._is_born = True
             self._say(self._node.birth(self._look(), self._spool.last))
@@ -102,6 +112,10 @@ class Session:
             self._say(self._node.data(samples))
         self._until_answered(client, [self._node.topic("NCMD")])
         self._reached.take(samples)
+        now = time.monotonic()
+        self._lately.append((now, list(runs(samples))))
+        while self._lately[0][0] < now - _IN_DOUBT:
+            self._lately.popleft()
 
     def check(self) -> None:
         """Raises why the session has ended: a host wants to hear a birth soon, also where no sample waits."""
@@ -119,6 +133,8 @@ class Session:
         """The node is dead: the broker says so."""
         with self._lock:
             client, self._client = self._client, None
+            if self._is_born:
+                self._ended_at = time.monotonic()
             self._is_born = False
         if client is not None:
             # Without a farewell, so that the broker says what was left with it.
