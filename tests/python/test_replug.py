@@ -15,6 +15,8 @@ import pytest
 
 from drivebus import Bus, PortError, Simulator
 
+from .reopened import read_once_open
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="adapters are known on Linux only")
 if sys.platform != "win32":
     import fcntl
@@ -135,22 +137,12 @@ def test_a_port_of_which_only_the_name_is_known(tmp_path: Path, monkeypatch: pyt
 def test_a_serial_server_that_comes_back() -> None:
     with Simulator({1: "gd350"}, transport="tcp") as simulator, Bus(simulator.port) as bus:
         for _ in range(3):
-            assert identified(bus) == EXPECTED[IDENTIFICATION]
+            assert read_once_open(bus, IDENTIFICATION) == EXPECTED[IDENTIFICATION]
             simulator.line.unplug()
             with pytest.raises(PortError):
                 bus.read(1, IDENTIFICATION)
             simulator.line.replug()
-        assert identified(bus) == EXPECTED[IDENTIFICATION]
-
-
-def identified(bus: Bus) -> list[int]:
-    """What the unit says it is, once the port is open: on a busy machine a call may be told that it is being opened."""
-    while True:
-        try:
-            return bus.read(1, IDENTIFICATION)
-        except PortError as error:
-            if "is still being opened" not in str(error):
-                raise
+        assert read_once_open(bus, IDENTIFICATION) == EXPECTED[IDENTIFICATION]
 
 
 def test_who_has_a_busy_port_is_named(simulator: Simulator) -> None:
