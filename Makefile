@@ -335,7 +335,7 @@ oldest: $(VENV)/.dev ## of what the published crates need, the oldest versions
 SEMVER   := .tools/cargo-semver-checks/bin/cargo-semver-checks
 # The tag before this commit: the release that is being made is held to the one before.
 LAST_TAG  = $(shell git describe --tags --abbrev=0 --match 'v[0-9]*' HEAD^ 2>/dev/null)
-PUBLISHED := drivebus-rtu drivebus-line drivebus-drives drivebus-sim drivebus
+PUBLISHED := drivebus-rtu drivebus-line drivebus-drives drivebus-drive drivebus-sim drivebus
 
 $(SEMVER):
 	@sh tools/check_machine.sh $(PYTHON) rust

@@ -23,10 +23,11 @@ ROOT = Path(__file__).resolve().parent.parent
 CRATES: dict[str, set[str]] = {
     "rtu": set(),
     "drives": set(),
+    "drive": {"drives"},
     "line": {"rtu"},
     "sim": {"rtu", "drives", "line"},
-    "drivebus": {"rtu", "drives", "line", "sim"},
-    "python": {"rtu", "drives", "line", "sim"},
+    "drivebus": {"rtu", "drives", "drive", "line", "sim"},
+    "python": {"rtu", "drives", "drive", "line", "sim"},
 }
 
 # The trait of `line`, what its methods speak of, and pseudo-terminals: all that `sim` may name.

@@ -15,7 +15,7 @@ from tools import cross
 from tools.settle_wheel import ROOT
 
 SYSTEMS = ("x86_64-pc-windows-gnu", "aarch64-apple-darwin")
-PUBLISHED = ("drivebus-rtu", "drivebus-line", "drivebus-drives", "drivebus-sim", "drivebus")
+PUBLISHED = ("drivebus-rtu", "drivebus-line", "drivebus-drives", "drivebus-drive", "drivebus-sim", "drivebus")
 
 
 def check(system: str) -> bool:

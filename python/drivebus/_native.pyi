@@ -479,6 +479,25 @@ def open_bus(
     """Opens a `Bus` in a thread of its own, and leaves it in *mailbox*."""
 
 @final
+class Rule:
+    """What may be asked of units of one family, under one trust.
+
+    Each answer is None where it may, or a kind of reason and what the profile says of it, which may be empty. Kinds are
+    `no_address`, `only_written`, `not_printed`, `no_range`, `no_command`, `no_state` and `no_fault`.
+    """
+
+    def __new__(cls, profile: Profile, trusts_all: bool, /) -> Rule: ...
+    def read(self, name: str, /) -> tuple[str, str] | None:
+        """NotAllowed: there is no such name."""
+    def write(self, name: str, /) -> tuple[str, str] | None:
+        """NotAllowed: there is no such name."""
+    def word(self, name: str, word: int, /) -> tuple[str, str] | None:
+        """NotAllowed: there is no such name."""
+    def command(self, name: str, /) -> tuple[str, str] | None: ...
+    def state(self) -> tuple[str, str] | None: ...
+    def fault(self) -> tuple[str, str] | None: ...
+
+@final
 class Profile:
     """What one family of drives means by its registers."""
 

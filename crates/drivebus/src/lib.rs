@@ -80,6 +80,7 @@ pub use payload::Payload;
 pub use poll::{Poll, Sample, Target};
 pub use reading::{Reading, Values};
 
+pub use drivebus_drive as drive;
 pub use drivebus_drives as drives;
 pub use drivebus_line as line;
 pub use drivebus_rtu as rtu;

@@ -23,6 +23,7 @@ mod poll;
 mod profile;
 mod pyserial;
 mod requests;
+mod rule;
 mod sheet;
 mod signals;
 mod sim;
@@ -61,6 +62,8 @@ mod _native {
     use crate::profile::{Profile, exception_means};
     #[pymodule_export]
     use crate::requests::{Asked, Requests, open_bus};
+    #[pymodule_export]
+    use crate::rule::Rule;
     #[pymodule_export]
     use crate::sheet::read_sheet;
     #[pymodule_export]

@@ -444,8 +444,13 @@ impl Profile {
 impl Profile {
     /// The register or parameter that `name` means, listed or not.
     fn find(&self, name: &Bound<'_, PyAny>) -> PyResult<Cow<'_, Entry>> {
-        self.0.resolve(&text("name", name)?).map_err(refuse)
+        entry_of(&self.0, name)
     }
+}
+
+/// The register or parameter of `profile` that `name` means, listed or not.
+pub(crate) fn entry_of<'p>(profile: &'p drives::Profile, name: &Bound<'_, PyAny>) -> PyResult<Cow<'p, Entry>> {
+    profile.resolve(&text("name", name)?).map_err(refuse)
 }
 
 /// What an exception means by the specification.

@@ -1,8 +1,7 @@
 """What may be asked of a drive where its documents are silent.
 
-What documents of the very family print may be used. What they print in part, or for a sister series, may be read;
-written it is only for who says `unverified=True`, and so is whatever they do not print at all. What has no address
-cannot be asked for in any case. Profiles know which is which, and why; here the rule stands, and its words.
+The rule stands in the core (`crates/drive`): what documents of the very family print may be used, and what they print
+in part or not at all is for who says `unverified=True`. Here are its words.
 """
 
 from __future__ import annotations
@@ -10,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
-from drivebus import checks
+from drivebus import _native, checks
 from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed, Unverified
-from drivebus.profile.profile import Profile
+from drivebus.profile.profile import Profile, native_of
 
 __all__ = ["Evidence", "not_verified"]
 
@@ -51,6 +50,7 @@ class Evidence:
         self.profile = profile
         self.unverified = unverified
         self.unit = unit
+        self._rule = _native.Rule(native_of(profile), unverified)
         self._readable: set[str] = set()
         self._worked_out: dict[Callable[[Evidence], Any], Any] = {}
 
@@ -82,26 +82,19 @@ class Evidence:
             # Programs read the same few names again and again.
             if name in self._readable:
                 continue
-            missing = self.unreadable(name)
-            if missing is not None:
-                known = self.profile.describe(name)
-                if known.address is None:
+            why = self._rule.read(name)
+            if why is not None:
+                kind, reason = why
+                if kind == "no_address":
                     raise self._without_address(name)
-                if known.access == "wo":
+                if kind == "only_written":
                     raise BadArgument(f"{self._named(name)} can only be written; nothing was sent", unit=self.unit)
-                raise not_verified(f"reading {self._named(name)}", missing, self.unit)
+                raise not_verified(f"reading {self._named(name)}", reason, self.unit)
             self._readable.add(name)
 
     def unreadable(self, name: str) -> str | None:
         """Why *name* may not be read; None if it may."""
-        known = self.profile.describe(name)
-        if known.address is None:
-            return f"its address is not known: {_sentence(known.reason or known.note)}"
-        if known.access == "wo":
-            return "it can only be written"
-        if known.evidence == "assumed" and not self.unverified:
-            return known.reason or _WHY_UNKNOWN
-        return None
+        return self._worded(self._rule.read(name))
 
     def readable(self, names: Iterable[str]) -> list[str]:
         """Those of *names* that may be read."""
@@ -109,44 +102,38 @@ class Evidence:
 
     def require_writable(self, name: str) -> None:
         """Raises `NotAllowed` if *name* may not be written."""
-        known = self.profile.describe(name)
-        if known.address is None:
-            raise self._without_address(name)
-        if known.evidence != "verified" and not self.unverified:
-            raise not_verified(f"writing {self._named(name)}", known.reason, self.unit)
+        why = self._rule.write(name)
+        if why is not None:
+            kind, reason = why
+            if kind == "no_address":
+                raise self._without_address(name)
+            raise not_verified(f"writing {self._named(name)}", reason, self.unit)
 
     def require_writable_word(self, name: str, word: int) -> None:
         """Raises `NotAllowed` if nothing that is printed tells whether *name* takes *word*."""
-        known = self.profile.describe(name)
-        if not (known.bounded or word in known.choices or self.unverified):
+        if self._rule.word(name, word) is not None:
             raise not_verified(f"writing {word} to {self._named(name)}", _NO_RANGE, self.unit)
 
     def require_command(self, name: str) -> None:
         """Raises `NotAllowed` if the family has no command *name*, or it may not be given."""
-        reason = self.unusable(name)
-        if name not in self.profile.commands():
-            raise BadArgument(f"{reason}; nothing was sent to unit {self.unit}", unit=self.unit)
-        if reason is not None:
+        why = self._rule.command(name)
+        if why is not None:
+            kind, reason = why
+            if kind == "no_command":
+                raise BadArgument(f"{self.unusable(name)}; nothing was sent to unit {self.unit}", unit=self.unit)
             raise not_verified(f"the command {name} of {self.profile.title}", reason, self.unit)
 
     def unusable(self, command: str) -> str | None:
         """Why *command* may not be given; None if it may."""
-        if command not in self.profile.commands():
-            return f"no command {command} of {self.profile.title} is known"
-        reason = self.profile.command_reason(command)
-        return None if self.allows(reason) else reason
+        return self._worded(self._rule.command(command), f"command {command}")
 
     def without_state(self) -> str | None:
         """Why the family's states may not be used; None if they may."""
-        word = self.profile.role("state")
-        if word is None:
-            return f"no state word of {self.profile.title} is known"
-        return self.unreadable(word) or (None if self.unverified else self.profile.state_reason())
+        return self._worded(self._rule.state())
 
     def without_fault(self) -> str | None:
         """Why the present fault may not be read; None if it may."""
-        register = self.profile.role("fault")
-        return f"no fault register of {self.profile.title} is known" if register is None else self.unreadable(register)
+        return self._worded(self._rule.fault())
 
     def missing(self, what: str, reason: str, better: Callable[[Evidence], str | None]) -> NotAllowed:
         """The error for *what*, which cannot be done for *reason*; *better* tells it under unverified=True."""
@@ -163,6 +150,18 @@ class Evidence:
         """Raises `NotAllowed` if *what* has a *reason* not to be used, and nobody said that it may be all the same."""
         if not self.allows(reason):
             raise not_verified(what, reason, self.unit)
+
+    def _worded(self, why: tuple[str, str] | None, what: str = "") -> str | None:
+        """A reason of the core in words; None where there is none."""
+        if why is None:
+            return None
+        kind, reason = why
+        if kind == "no_address":
+            return f"its address is not known: {_sentence(reason)}"
+        if kind == "only_written":
+            return "it can only be written"
+        missing = {"no_command": what, "no_state": "state word", "no_fault": "fault register"}.get(kind)
+        return (reason or _WHY_UNKNOWN) if missing is None else f"no {missing} of {self.profile.title} is known"
 
     def _named(self, name: str) -> str:
         return f"{name} ({self.profile.describe(name).label}) of {self.profile.title}"
