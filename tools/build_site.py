@@ -50,6 +50,7 @@ CRATES = {
     "crates/rtu": "drivebus_rtu",
     "crates/line": "drivebus_line",
     "crates/drives": "drivebus_drives",
+    "crates/drive": "drivebus_drive",
     "crates/sim": "drivebus_sim",
 }
 """What cargo doc calls the folder of each published crate."""
