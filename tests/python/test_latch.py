@@ -73,8 +73,8 @@ threading.Thread(target=threading.Event().wait, daemon=True).start()
 # The other thread takes the signal: the main thread has it to be served, and nothing wakes it, as when a signal comes
 # between its last look and its wait.
 signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-print("waits", flush=True)
 try:
+    print("waits", flush=True)
     Latch().wait()
 except KeyboardInterrupt:
     print("interrupted", flush=True)
