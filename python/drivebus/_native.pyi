@@ -27,6 +27,7 @@ __all__ = [
     "Poller",
     "Profile",
     "Requests",
+    "Rule",
     "SerialFormat",
     "SimulatedDrive",
     "SimulatedLine",
