@@ -36,11 +36,13 @@ class Reached:
                 }
         return self._inside
 
-    def take(self, samples: Sequence[Spooled]) -> None:
-        """It has *samples*, too."""
+    def take(self, samples: Sequence[Spooled]) -> list[tuple[str, int, int]]:
+        """It has *samples*, too. Returns their runs, as `give_back` takes them."""
         assert self._inside is not None
-        for epoch, first, last in runs(samples):
+        taken = list(runs(samples))
+        for epoch, first, last in taken:
             self._inside.setdefault(epoch, Intervals()).add(first, last)
+        return taken
 
     def give_back(self, lost: Iterable[tuple[str, int, int]]) -> None:
         """It may not have these runs of numbers, by the names of their epochs."""

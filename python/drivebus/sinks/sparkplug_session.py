@@ -20,7 +20,7 @@ import paho.mqtt.client as paho
 from paho.mqtt.enums import MQTTErrorCode
 
 from drivebus.errors import NotAllowed
-from drivebus.sinks.intervals import Intervals, runs
+from drivebus.sinks.intervals import Intervals
 from drivebus.sinks.mqtt_client import Client, cut, in_words, new_client, reason_of
 from drivebus.sinks.picture import Picture
 from drivebus.sinks.reached import Reached
@@ -78,7 +78,6 @@ class Session:
         self._patience = _HOST_FIRST
         self._is_over = False
         self._lately: deque[tuple[float, list[tuple[str, int, int]]]] = deque()
-        self._ended_at = 0.0
 
     def open(self) -> Mapping[str, Intervals]:
         """Connects, waits for the primary host if there is one, and bears the node and all drives that answer."""
@@ -95,9 +94,7 @@ class Session:
         self._until_host_is_there()
         inside = self._reached.open()
         while self._lately:
-            said_at, some = self._lately.popleft()
-            if said_at > self._ended_at - _IN_DOUBT:
-                self._reached.give_back(some)
+            self._reached.give_back(self._lately.popleft()[1])
         with self._lock:
             self._is_born = True
             self._say(self._node.birth(self._look(), self._spool.last))
@@ -111,11 +108,8 @@ class Session:
                 raise NotAllowed("the connection ended")
             self._say(self._node.data(samples))
         self._until_answered(client, [self._node.topic("NCMD")])
-        self._reached.take(samples)
-        now = time.monotonic()
-        self._lately.append((now, list(runs(samples))))
-        while self._lately[0][0] < now - _IN_DOUBT:
-            self._lately.popleft()
+        self._lately.append((time.monotonic(), self._reached.take(samples)))
+        self._forget()
 
     def check(self) -> None:
         """Raises why the session has ended: a host wants to hear a birth soon, also where no sample waits."""
@@ -134,12 +128,17 @@ class Session:
         with self._lock:
             client, self._client = self._client, None
             if self._is_born:
-                self._ended_at = time.monotonic()
+                self._forget()
             self._is_born = False
         if client is not None:
             # Without a farewell, so that the broker says what was left with it.
             cut(client)
             client.loop_stop()
+
+    def _forget(self) -> None:
+        """What was told so long ago that whoever heard it has it."""
+        while self._lately and self._lately[0][0] <= time.monotonic() - _IN_DOUBT:
+            self._lately.popleft()
 
     def _connected(self, will: Message) -> Client:
         broker = self._settings.broker
