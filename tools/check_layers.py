@@ -52,12 +52,15 @@ LINE_ROOMS = [
     "gateway",
 ]
 
+_NO_WORLD = re.compile(
+    r"\bstd::(?:net|thread|process)\b|\bstd::time::(?!Duration\b)|\bInstant::now\b|\bSystemTime\b|\bunsafe\b"
+)
+
 # What the pure crates must not know. Comments and strings do not count.
 FORBIDDEN_IN_CRATE: dict[str, re.Pattern[str]] = {
     "rtu": re.compile(r"\b(?:std|alloc)::|\bextern\s+crate\b|\bunsafe\b|\blog::|println!"),
-    "drives": re.compile(
-        r"\bstd::(?:net|thread|process)\b|\bstd::time::(?!Duration\b)|\bInstant::now\b|\bSystemTime\b|\bunsafe\b"
-    ),
+    "drives": _NO_WORLD,
+    "drive": _NO_WORLD,
     "line": re.compile(r"\bunsafe\b"),
     "python": re.compile(r"\bunsafe\b"),
     "sim": re.compile(r"\bunsafe\b"),
@@ -469,6 +472,18 @@ BREAKS: list[tuple[str, str | None, str, str]] = [
         "//!",
         "use std::thread::sleep;\n//!",
         "drives/src/lib.rs: must not use `std::thread`",
+    ),
+    (
+        "crates/drive/src/rule.rs",
+        "//!",
+        "use std::time::Instant;\n//!",
+        "drive/src/rule.rs: must not use `std::time::`",
+    ),
+    (
+        "crates/drive/Cargo.toml",
+        HEAD,
+        f"{HEAD}\ndrivebus-line.workspace = true",
+        "crates/drive: must not use drivebus-line",
     ),
     (
         "crates/line/Cargo.toml",
