@@ -107,7 +107,6 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--json", action="store_true")
     given = parser.parse_args()
-    # The page is a guest on this machine, as the line is.
     figures = measure(given.pages, given.seconds, given.runs) | {"processors": os.cpu_count() or 1}
     show(given.json, figures, markdown(list(figures), [[f"{value:g}" for value in figures.values()]]))
 

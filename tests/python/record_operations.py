@@ -21,7 +21,7 @@ from drivebus.operations.events import LOGGER
 from .recorded_bus import Noting
 from .recorded_calls import Case, cases_of
 from .recorded_operations import FOLDER, Talk
-from .recorded_scenes import MISHAPS, NO_REQUEST, Counts, stage_of
+from .recorded_scenes import COMMON, MISHAPS, NO_REQUEST, Counts, stage_of
 
 __all__ = ["record"]
 
@@ -110,7 +110,7 @@ def record(family: str) -> Iterator[dict[str, Any]]:
         counted: list[Counts] = []
         turns = [(NOTHING, trust) for trust in range(len(TRUSTS))]
         for mishap in names[1:]:
-            is_common = MISHAPS[mishap].is_common
+            is_common = mishap in COMMON
             every = rates[0 if is_common else 1]
             turn = number + 7 * place + 3 * names.index(mishap)
             if turn % every == 0 or (is_common and family == FULLEST and case.name in OF_FEW):

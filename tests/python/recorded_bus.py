@@ -10,16 +10,17 @@ is seen of the line then. tests/vectors/README.md has the form.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import Any, TypeAlias, overload
 
 from drivebus import errors
-from drivebus._native import crc16
 from drivebus.errors import LINE_ERRORS, DrivebusError, NotReady, PortError, Refused, Unconfirmed
 from drivebus.line.asking import Read, Stamped, Write
 from drivebus.line.stats import Link
+from drivebus.rtu import encode_write, framed
 
 __all__ = ["EPOCH", "UNIT", "Noting", "Replaying", "Step", "Telling", "rebuilt", "told_of", "wish_of"]
 
@@ -300,16 +301,10 @@ def rebuilt(told: dict[str, Any], request: Read | Write | None, started: float, 
 def frame_of(request: Read | Write) -> bytes:
     """The frame of *request*, as the specification has it."""
     if isinstance(request, Read):
-        function, rest = _READS[request.table], request.count.to_bytes(2, "big")
-    elif isinstance(request.value, int):
-        coil = 0xFF00 if request.value else 0
-        function = 0x05 if request.table == "coil" else 0x06
-        rest = (coil if request.table == "coil" else request.value).to_bytes(2, "big")
-    else:
-        words = b"".join(word.to_bytes(2, "big") for word in request.value)
-        function, rest = 0x10, (len(words) // 2).to_bytes(2, "big") + bytes([len(words)]) + words
-    body = bytes([request.unit, function]) + request.address.to_bytes(2, "big") + rest
-    return body + crc16(body).to_bytes(2, "little")
+        return framed(struct.pack(">BBHH", request.unit, _READS[request.table], request.address, request.count))
+    if request.table == "coil":
+        return framed(struct.pack(">BBHH", request.unit, 0x05, request.address, 0xFF00 if request.value else 0))
+    return encode_write(request.unit, request.address, request.value)
 
 
 def _at(unit: int) -> str:

@@ -18,7 +18,7 @@ from drivebus.line.asking import Read, Write
 
 from .recorded_bus import UNIT
 
-__all__ = ["MISHAPS", "NO_REQUEST", "Counts", "Mishap", "Stage", "stage_of"]
+__all__ = ["COMMON", "MISHAPS", "NO_REQUEST", "Counts", "Mishap", "Stage", "stage_of"]
 
 TIMEOUT, LATE = 0.06, 0.1
 """Seconds that an answer is waited for, and that one is late: short, so that silence takes few looks."""
@@ -115,11 +115,6 @@ class Mishap(NamedTuple):
     is_of_writes: bool = False
     other: int | None = None
 
-    @property
-    def is_common(self) -> bool:
-        """Whether it is one of those that a plant meets most, and that are noted most often."""
-        return self in COMMON
-
 
 def stage_of(family: str, stands: str, other: int | None, seed: str, left: ExitStack) -> Stage:
     """A drive that *stands* so. What random choices there are depend on *seed* alone."""
@@ -160,10 +155,6 @@ def _stand(simulator: Simulator, family: str, stands: str) -> None:
 
 def _half(counts: Counts) -> int:
     return counts.requests // 2
-
-
-def _lose_all(stage: Stage) -> Callable[[], None]:
-    return lambda: stage.simulator.line.drop_answers(_EVER)
 
 
 def _first(act: Callable[[Stage], object]) -> Mishap:
@@ -256,22 +247,19 @@ MISHAPS: dict[str, Mishap] = {
 }
 """What may go wrong, by its name."""
 
-COMMON = [
-    MISHAPS[name]
-    for name in (
-        "first answer lost",
-        "every answer lost",
-        "first answer damaged",
-        "first answer late",
-        "answer to command lost",
-        "busy",
-        "refused 04",
-        "in fault",
-        "no voltage",
-        "keypad",
-        "running",
-        "another family",
-        "gone half-way",
-    )
-]
-"""Those that a plant meets most."""
+COMMON = (
+    "first answer lost",
+    "every answer lost",
+    "first answer damaged",
+    "first answer late",
+    "answer to command lost",
+    "busy",
+    "refused 04",
+    "in fault",
+    "no voltage",
+    "keypad",
+    "running",
+    "another family",
+    "gone half-way",
+)
+"""Those that a plant meets most, and that are noted most often."""

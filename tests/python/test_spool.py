@@ -161,7 +161,6 @@ def test_a_disk_that_takes_nothing_is_told_once_and_nothing_is_lost(quick_folder
 
 WRITES = """
 import sys
-from contextlib import closing
 from pathlib import Path
 from drivebus.spool import Layout, Spool
 layout = Layout("pump", "gd350", ("a",), ("",), (0,))
