@@ -307,7 +307,8 @@ def test_what_drives_say_waits_in_the_spool(tmp_path: Path) -> None:
             assert re.search(r"ghost, asked \d+\.\d s ago: unit 9, read", shown)
         with Spool(tmp_path / "drivebus-spool", 1 << 30, print) as spool:
             samples = spool.reader("test").after(0, 10_000)
-        monitor = [each for each in samples if len(each.layout.names) > len(SPARSE)]
+        # A busy machine may answer a read too late: that sample holds its reason, and no values.
+        monitor = [each for each in samples if len(each.layout.names) > len(SPARSE) and each.values]
         frequency = [each.values[0] for each in samples if each.layout.names == SPARSE and each.values]
         speed = monitor[0].layout.names.index("running_frequency")
         assert [each.values[speed] for each in monitor] == sorted(each.values[speed] for each in monitor)
