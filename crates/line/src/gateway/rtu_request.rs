@@ -1,7 +1,9 @@
 //! One request of Modbus RTU over TCP. No silence separates frames there: how long each is, its function says, and its CRC
 //! says whether that is so.
 
-use drivebus_rtu::{Frame, MAX_ADU};
+use std::slice;
+
+use drivebus_rtu::{Frame, MAX_ADU, crc};
 
 use crate::gateway::asked::{Asked, NotModbus};
 
@@ -18,7 +20,7 @@ pub(super) fn first(bytes: &[u8]) -> Result<Option<(Asked, &[u8])>, NotModbus> {
             Some(frame) => Frame::parse(frame).map(|_| length).map_err(|_| NotModbus::Crc)?,
         },
         // A function whose length is not known ends where a CRC says so.
-        None => match (SHORTEST..=most).find(|&length| Frame::parse(&bytes[..length]).is_ok()) {
+        None => match end_by_crc(&bytes[..most]) {
             Some(length) => length,
             None if bytes.len() < MAX_ADU => return Ok(None),
             None => return Err(NotModbus::Crc),
@@ -27,6 +29,17 @@ pub(super) fn first(bytes: &[u8]) -> Result<Option<(Asked, &[u8])>, NotModbus> {
     let (frame, behind) = bytes.split_at(found);
     let asked = Asked { transaction: 0, unit: frame[0], pdu: frame[1..found - 2].to_vec() };
     Ok(Some((asked, behind)))
+}
+
+/// Where the first frame ends that `bytes` can begin with: the CRC of a frame and its own CRC is zero.
+///
+/// Each byte is looked at once, since a client may send them one by one.
+fn end_by_crc(bytes: &[u8]) -> Option<usize> {
+    let mut so_far = crc::START;
+    (1..).zip(bytes).find_map(|(length, byte)| {
+        so_far = crc::update(so_far, slice::from_ref(byte));
+        (length >= SHORTEST && so_far == 0).then_some(length)
+    })
 }
 
 /// How long the frame is that `bytes` begin with, as far as its function tells by now: by the specification V1.1b3, §6.
