@@ -29,6 +29,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 DOUBT = "crates/rtu/src/doubt.rs"
 DAMAGED = "crates/rtu/src/doubt/damaged.rs"
+OWED = "crates/rtu/src/doubt/owed.rs"
 LENGTHS = "crates/rtu/src/doubt/lengths.rs"
 JUDGE = "crates/rtu/src/master/judge.rs"
 MASTER = "crates/rtu/src/master.rs"
@@ -184,8 +185,8 @@ BREAKS = [
     Break(
         "requests of one kind are counted",
         DOUBT,
-        "open.count = if over { 1 } else { open.count.saturating_add(1) };",
-        "open.count = 1;",
+        "(open.count.saturating_add(1), open.owed.saturating_add(owed))",
+        "(1, open.owed.saturating_add(owed))",
         "overtaking --requests 5 --faults 0",
         beside=ONE_TIME,
     ),
@@ -324,7 +325,7 @@ BREAKS = [
     Break(
         "a refusal may have been another's",
         DOUBT,
-        "self.enter(now, (unit, expected, false), window, since);\n        }\n    }",
+        "self.enter(now, (unit, expected, Because::Displaced), window, since);\n        }\n    }",
         "let _ = (window, since);\n        }\n    }",
         # A refusal is taken for another read's, whose answer for the next's, and so on: until nobody asks twice.
         "overtaking --requests 5 --refusals 1 --retries 0",
@@ -344,6 +345,13 @@ BREAKS = [
         "overtaking --requests 3 --refusals 1 --retries 0",
     ),
     Break(
+        "as many as the unit owes can come",
+        DOUBT,
+        "let most = 1 + self.owed(unit).max(1);",
+        "let most = 2;",
+        "overtaking --requests 5 --faults 0",
+    ),
+    Break(
         "a write waits",
         DOUBT,
         "Some(latest) if !expected.is_read() => Attribution::Wait(latest),",
@@ -360,9 +368,9 @@ BREAKS = [
     # --- what was seen
     Break(
         "an answer seen takes one of its kind away",
-        DAMAGED,
-        "Some(open) if is_first(open) && open.count > 1 => open.count -= 1,",
-        "",
+        OWED,
+        "open.count -= 1;",
+        "open.count = 0;",
         "overtaking --requests 4 --faults 0",
         beside=ONE_TIME,
     ),

@@ -22,6 +22,7 @@
 mod damaged;
 mod lateness;
 mod lengths;
+mod owed;
 
 use core::time::Duration;
 
@@ -106,6 +107,17 @@ impl Attribution {
     }
 }
 
+/// Why an answer may still come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Because {
+    /// None came.
+    NoneCame,
+    /// It came damaged, and may come again.
+    Damaged,
+    /// What was taken for it may have been another one.
+    Displaced,
+}
+
 /// Requests of one kind to one unit that were left open.
 #[derive(Debug, Clone, Copy)]
 struct Open {
@@ -114,6 +126,8 @@ struct Open {
     /// Whether they came damaged, and may come again.
     again: bool,
     count: u8,
+    /// How many of them the unit owes more than it has answered: see [`owed`].
+    owed: u8,
     /// When the latest of them was given up, or the one that it displaced.
     given_up: Instant,
     /// The same, or when the latest answer was taken that one of them may have been.
@@ -178,14 +192,14 @@ impl Doubts {
 
     /// `unit` was asked for `expected` with a time-out of `timeout`, and at `now` the answer is given up.
     pub(crate) fn left_open(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) {
-        self.enter(now, (unit, expected, false), window(timeout), now);
+        self.enter(now, (unit, expected, Because::NoneCame), window(timeout), now);
         self.open.insert(unit);
     }
 
     /// The answer of `unit` to `expected` came damaged. It may come again within `window`; after that it does not, in order or
     /// not.
     pub(crate) fn may_come_again(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration) {
-        self.enter(now, (unit, expected, true), window, now);
+        self.enter(now, (unit, expected, Because::Damaged), window, now);
     }
 
     /// The line has shown that what came damaged does not come again: nor did what came so before of `unit`, in the place of
@@ -194,14 +208,16 @@ impl Doubts {
         self.forget(unit, |open| open.again);
     }
 
-    /// What is open: of whom, what, and whether it came damaged before. `since`: when the answer was given up that started it.
+    /// What is open: of whom, what, and why. `since`: when the answer was given up that started it.
     fn enter(
         &mut self,
         now: Instant,
-        (unit, expected, again): (UnitAddress, Expected, bool),
+        (unit, expected, because): (UnitAddress, Expected, Because),
         window: Duration,
         since: Instant,
     ) {
+        let again = because == Because::Damaged;
+        let owed = u8::from(because != Because::Displaced);
         let last = capped(now, since, window);
         let alike = |open: &Open| {
             open.unit == unit
@@ -214,24 +230,34 @@ impl Doubts {
         let latest = self.ledger.iter_mut().flatten().filter(|open| alike(open)).max_by_key(|open| open.last);
         if let Some(open) = latest.filter(|_| !is_one_more) {
             let over = open.is_past(now) && !self.open.contains(unit) && !expected.is_echo();
-            open.count = if over { 1 } else { open.count.saturating_add(1) };
+            let before = *open;
+            (open.count, open.owed) =
+                if over { (1, owed) } else { (open.count.saturating_add(1), open.owed.saturating_add(owed)) };
             open.given_up = open.given_up.max(since);
             open.last = open.last.max(last);
             open.window = if over { window } else { open.window.max(window) };
             if expected.is_echo() && open.count >= MUTE {
                 self.echoers.remove(unit);
             }
+            if over {
+                self.is_owed_still(before);
+            }
             return;
         }
         self.listed.insert(unit);
-        let open = Open { unit, expected, again, count: 1, given_up: since, last, window, follows: None };
+        let open = Open { unit, expected, again, count: 1, owed, given_up: since, last, window, follows: None };
         let over = |open: &Option<Open>| open.is_none_or(|open| !self.open.contains(open.unit) && open.is_past(now));
-        if let Some(place) = self.ledger.iter().position(over) {
-            self.ledger[place] = Some(open);
+        let displaced = if let Some(place) = self.ledger.iter().position(over) {
+            self.ledger[place].replace(open)
         } else if let Some(oldest) = self.ledger.iter_mut().flatten().min_by_key(|open| open.last) {
             self.forgotten.insert(oldest.unit);
             self.forgotten_until = self.forgotten_until.max(oldest.last + oldest.window);
-            *oldest = open;
+            Some(core::mem::replace(oldest, open))
+        } else {
+            None
+        };
+        if let Some(open) = displaced {
+            self.is_owed_still(open);
         }
     }
 
@@ -410,7 +436,7 @@ impl Doubts {
             }
         }
         if let Some((since, window)) = displaced {
-            self.enter(now, (unit, expected, false), window, since);
+            self.enter(now, (unit, expected, Because::Displaced), window, since);
         }
     }
 
@@ -431,6 +457,9 @@ impl Doubts {
                 refusal = refusal.saturating_add(open.count);
             }
         }
+        // What took the place of another, and that other, are both listed; of the two one is open.
+        let most = 1 + self.owed(unit).max(1);
+        let (words, refusal) = (words.min(most), refusal.min(most));
         match self.rivals_end(now, unit, expected) {
             None => Attribution::Certain,
             // What refuses another is told by the master as that.
@@ -529,9 +558,9 @@ impl Doubts {
     }
 
     fn forget(&mut self, unit: UnitAddress, which: impl Fn(&Open) -> bool) {
-        for place in &mut self.ledger {
-            if place.as_ref().is_some_and(|open| open.unit == unit && which(open)) {
-                *place = None;
+        for place in 0..KEPT {
+            if let Some(open) = self.ledger[place].take_if(|open| open.unit == unit && which(open)) {
+                self.is_owed_still(open);
             }
         }
         if self.of(unit).next().is_none() {

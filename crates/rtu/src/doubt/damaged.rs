@@ -27,13 +27,8 @@ impl Doubts {
         }
         self.learns_lateness(now, unit, |open| fits(open) && !open.is_past(now));
         let is_first = |open: &Open| fits(open) && (open.unit, open.last + open.window) == (unit, end);
-        for place in &mut self.ledger {
-            match place {
-                Some(open) if is_first(open) && open.count > 1 => open.count -= 1,
-                Some(open) if is_first(open) => *place = None,
-                _ => continue,
-            }
-            break;
+        if let Some(place) = self.ledger.iter().position(|place| place.as_ref().is_some_and(is_first)) {
+            self.came(place);
         }
         self.ends_unless_open(now, unit);
         Some((unit, expected))

@@ -9,6 +9,7 @@ mod forgotten;
 mod lengths;
 mod open;
 mod others;
+mod owed;
 mod quarantine;
 mod torn;
 mod turns;
