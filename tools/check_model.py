@@ -325,8 +325,8 @@ BREAKS = [
     Break(
         "a refusal may have been another's",
         DOUBT,
-        "self.enter(now, (unit, expected, Because::Displaced), window, since);\n        }\n    }",
-        "let _ = (window, since);\n        }\n    }",
+        "self.enter(now, (unit, expected, because), window, since);\n        }\n    }",
+        "let _ = (window, since, because);\n        }\n    }",
         # A refusal is taken for another read's, whose answer for the next's, and so on: until nobody asks twice.
         "overtaking --requests 5 --refusals 1 --retries 0",
     ),

@@ -196,6 +196,26 @@ impl Doubts {
         self.open.insert(unit);
     }
 
+    /// The same, but a refusal came, which is its own or that of another that is open. `others`: or that of another master.
+    pub(crate) fn left_open_or_refused(
+        &mut self,
+        now: Instant,
+        (unit, expected): (UnitAddress, Expected),
+        timeout: Duration,
+        others: bool,
+    ) {
+        let because = if self.owed(unit) > 0 { self.taken_because(now, unit, others) } else { Because::NoneCame };
+        self.enter(now, (unit, expected, because), window(timeout), now);
+        self.open.insert(unit);
+    }
+
+    /// Why `unit` may still answer where something came of it that may have been the answer to something else.
+    fn taken_because(&self, now: Instant, unit: UnitAddress, others: bool) -> Because {
+        // What somebody else asked is not in the ledger, and so it is owed besides.
+        let may_be_anybodys = others || self.is_strange(now, unit) || self.has_forgotten(now, unit);
+        if may_be_anybodys { Because::NoneCame } else { Because::Displaced }
+    }
+
     /// The answer of `unit` to `expected` came damaged. It may come again within `window`; after that it does not, in order or
     /// not.
     pub(crate) fn may_come_again(&mut self, now: Instant, unit: UnitAddress, expected: Expected, window: Duration) {
@@ -406,15 +426,16 @@ impl Doubts {
         }
     }
 
-    /// `unit` was asked for `expected` with a time-out of `timeout`, and an answer or a refusal was taken for its own.
+    /// `unit` was asked for `expected` with a time-out of `timeout`, and an answer or a refusal was taken for its own. `others`: it
+    /// may have been that of another master.
     pub(crate) fn taken(
         &mut self,
         now: Instant,
-        unit: UnitAddress,
-        expected: Expected,
+        (unit, expected): (UnitAddress, Expected),
         timeout: Duration,
         refused: bool,
         follow: Duration,
+        others: bool,
     ) {
         if !self.listed.contains(unit) {
             return;
@@ -436,7 +457,8 @@ impl Doubts {
             }
         }
         if let Some((since, window)) = displaced {
-            self.enter(now, (unit, expected, Because::Displaced), window, since);
+            let because = self.taken_because(now, unit, others);
+            self.enter(now, (unit, expected, because), window, since);
         }
     }
 

@@ -85,7 +85,8 @@ impl Master {
                             self.give_account(false);
                             self.state = State::Idle;
                             self.hear(now, range.clone());
-                            self.doubts.left_open(now, unit, expected, timeout);
+                            let others = self.others.may_be();
+                            self.doubts.left_open_or_refused(now, (unit, expected), timeout, others);
                             let frame = self.framer.held(range);
                             return Some(Event::Wrong { error: AnswerError::Refusal { code }, frame });
                         }
@@ -168,7 +169,7 @@ impl Master {
     /// What came of `unit`, or its refusal, is taken for the answer to `expected`.
     fn takes(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration, refused: bool) {
         let follow = self.time_to_follow(expected);
-        self.doubts.taken(now, unit, expected, timeout, refused, follow);
+        self.doubts.taken(now, (unit, expected), timeout, refused, follow, self.others.may_be());
     }
 
     /// What came at `range` is no frame: noise, or `is_damaged`: it begins as the answer does.

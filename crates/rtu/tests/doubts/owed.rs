@@ -59,3 +59,28 @@ fn what_took_the_place_of_another_is_owed_when_that_is_forgotten() {
     assert_eq!(asker.attribution(ms(5_500), &read(2)), repeat(1, 3));
     assert_eq!(asker.attribution(ms(5_500), &read(1)), repeat(3, 3));
 }
+
+/// In quarantine a refusal counts as no answer, and was one.
+#[test]
+fn what_was_refused_in_quarantine_came_all_the_same() {
+    let mut asker = Asker::of_a_unit_that_echoes();
+    asker.leaves_open(1_000, unit(1), &read(2));
+    for (time, count) in [(1_100, 3), (1_200, 4)] {
+        let came = asker.asks(time, unit(1), &read(count), &refuses(unit(1), &read(count)));
+        assert_eq!(came, Came::Wrong(AnswerError::Refusal { code: ExceptionCode::ILLEGAL_ADDRESS }));
+        assert!(asker.in_quarantine(ms(time)));
+    }
+    asker.echoes(1_300, unit(1));
+    assert_eq!(asker.attribution(ms(1_300), &read(1)), repeat(1, 2));
+}
+
+/// Where another master asks, an answer may be its, and then nothing of ours has come.
+#[test]
+fn where_others_ask_nothing_is_told_by_what_came() {
+    let mut asker = Asker::of_a_unit_that_echoes();
+    asker.master.expect_others(true);
+    asker.leaves_open(1_000, unit(1), &read(2));
+    asker.echoes(1_500, unit(1));
+    refused(&mut asker, 2_000, 1);
+    assert_eq!(asker.attribution(ms(2_000), &read(3)), repeat(1, 3));
+}
