@@ -160,6 +160,7 @@ OPERATIONS = [
     "program_end",
     "stop_proof",
     "drive_view",
+    "in_parts",
     "aim",
     "events",
     "raw_words",

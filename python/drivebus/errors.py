@@ -65,6 +65,8 @@ class DrivebusError(Exception):
         raw: The bytes that came back, as they came; empty if none did.
         started: Unix time in seconds at which the request began; None if it was not sent, or where several were.
         ended: Unix time in seconds at which it was given up or answered, or None.
+        in_part: Whether the drive took other writes of the same call before this one went wrong: some of several
+            parameters, or words that come before a start.
     """
 
     unit: int | None
@@ -72,6 +74,7 @@ class DrivebusError(Exception):
     raw: bytes
     started: float | None
     ended: float | None
+    in_part: bool = False
 
     def __init__(
         self,
@@ -96,7 +99,11 @@ class DrivebusError(Exception):
 
     @property
     def may_have_taken(self) -> bool:
-        """Whether a drive may have taken what was asked of it. False: it surely has not, and it may be asked again."""
+        """Whether a drive may have taken what was asked of it, or a part. False: it surely has not; ask again."""
+        return self.in_part or self._may_have_taken_it()
+
+    def _may_have_taken_it(self) -> bool:
+        """The same of the request that failed, whatever came before it."""
         if not isinstance(self, LINE_ERRORS):
             return True
         # Of one request it is known whether it was sent, and a read asks for nothing.
@@ -177,7 +184,7 @@ class Refused(DrivebusError):
     """The drive refused: an exception answer.
 
     Did the drive take it? No: what it was doing before, it still does. Only where *means* is `"taken"` it did, and is
-    at it.
+    at it. Where *in_part* is true it took others of the same call before.
 
     Attributes:
         code: The exception code, 1..255.
@@ -210,9 +217,7 @@ class Refused(DrivebusError):
         self.meaning = meaning
         self.means = means
 
-    @property
-    def may_have_taken(self) -> bool:
-        """See `DrivebusError`: where *means* is `"taken"`, it has."""
+    def _may_have_taken_it(self) -> bool:
         return self.means == "taken"
 
     @property
@@ -236,9 +241,7 @@ class NotReached(Unconfirmed, TimeoutError):
     last.
     """
 
-    @property
-    def may_have_taken(self) -> bool:
-        """See `DrivebusError`: there was nothing to take."""
+    def _may_have_taken_it(self) -> bool:
         return False
 
 
@@ -263,12 +266,10 @@ class NotStopped(Unconfirmed):
 class NotAllowed(DrivebusError, ValueError):
     """What was asked is not done. Most are one of the kinds below, which a program can tell apart.
 
-    Did the drive take it? No: what was asked was not sent.
+    Did the drive take it? No: what was asked was not sent. Where *in_part* is true, what comes before it was.
     """
 
-    @property
-    def may_have_taken(self) -> bool:
-        """See `DrivebusError`: nothing was sent."""
+    def _may_have_taken_it(self) -> bool:
         return False
 
 

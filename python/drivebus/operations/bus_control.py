@@ -12,6 +12,7 @@ from drivebus.errors import BadAnswer, NoAnswer, NotReady, PortError, Refused, U
 from drivebus.operations import parameter_writes, parameters, registers
 from drivebus.operations.by_name import by_name
 from drivebus.operations.drive_view import DriveView
+from drivebus.operations.in_parts import in_parts
 from drivebus.profile.evidence import not_verified
 from drivebus.profile.facts import Setting
 from drivebus.values import Control, ControlItem
@@ -44,6 +45,7 @@ async def check_control(unit: DriveView, setpoint: str | None = None, *, unverif
 
 
 @by_name("store", after=0)
+@in_parts
 async def prepare_control(
     unit: DriveView, *, store: bool = False, setpoint: str | None = None, unverified: bool = False
 ) -> Control:

@@ -13,6 +13,7 @@ from drivebus.errors import BadArgument, DrivebusError, Unconfirmed
 from drivebus.operations import parameters, registers, speed, state
 from drivebus.operations.commands import POLL_INTERVAL
 from drivebus.operations.drive_view import DriveView
+from drivebus.operations.in_parts import counted
 from drivebus.operations.last_will import LastWill
 from drivebus.operations.stop_proof import PATIENCE
 from drivebus.profile.evidence import not_verified
@@ -93,13 +94,16 @@ class BusTimeout:
         former = await registers.snapshot(self._unit, *self._former)
         self._former = {name: former[name] for name in self._former}
         try:
-            await parameters.write(self._unit, self._wanted)
-            shown = await registers.snapshot(self._unit, *self._wanted)
-        except BaseException:
+            with counted(self._unit) as unit:
+                await parameters.write(unit, self._wanted)
+                shown = await registers.snapshot(unit, *self._wanted)
+        except BaseException as error:
             # Ctrl-C as well. It may have taken a part. If it cannot be told to forget that, it acts: nobody keeps the
             # line busy.
             with suppress(DrivebusError):
                 await self._put_back()
+                if isinstance(error, DrivebusError):
+                    error.in_part = False
             raise
         encode = self._unit.profile.encode
         if any(encode(name, shown[name]) != encode(name, value) for name, value in self._wanted.items()):

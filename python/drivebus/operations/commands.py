@@ -46,6 +46,9 @@ POLL_INTERVAL = 0.02
 _LONGER_INTERVAL = 0.1
 """The same, where it takes longer than it was given. Each look goes before all who wait, as the stop did."""
 
+_LONG_LOOK = 0.5
+"""Seconds of the line's clock that a look takes only where it waits until nothing that is late can be mistaken."""
+
 _WRITE_MANY = 0x10
 
 A_WORD = "a word that can move the motor"
@@ -212,6 +215,7 @@ class Proof:
         if not self._asked:
             return True
         unit, command, fall = self._unit, self._command, self._fall
+        began = unit.bus.now()
         try:
             seen = await state.glance(unit, urgent=command in HALTS)
             if await self._shows(seen):
@@ -224,17 +228,20 @@ class Proof:
                 last += f", with commands from the {source}"
             # A motor that was told to stop is looked at: some drives run on in a fault.
             is_over = seen.fault is not None and command not in (*HALTS, "reset_fault")
+            ended = unit.bus.now()
+            # What was seen before a long wait for an answer that cannot be mistaken is old: that look is not the last.
+            looked_at = ended if ended - began < _LONG_LOOK else began
         except (NoAnswer, BadAnswer, Refused) as error:
             # A refusal here is one of a read: it says nothing about the command.
             last = f"its last answer: {error}; {state.seen_last(unit)}"
-            is_over = False
+            is_over, looked_at = False, unit.bus.now()
         except PortError as error:
             raise Unconfirmed(
                 f"{said(command)} was sent to unit {unit.address}; the port was lost before its state showed it "
                 f"({error}): {MAY[command]}; {state.seen_last(unit)}{_once(command)}",
                 unit=unit.address,
             ) from error
-        if not is_over and unit.bus.now() < (self._deadline if fall is None else fall.until):
+        if not is_over and looked_at < (self._deadline if fall is None else fall.until):
             return False
         raise Unconfirmed(
             f"{said(command)} was sent to unit {unit.address}, and its state does not show it: {MAY[command]}; {last}"

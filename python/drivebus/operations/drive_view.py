@@ -11,7 +11,18 @@ from drivebus.line.units import UnitRecord, units_of
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
 
-__all__ = ["DriveView"]
+__all__ = ["DriveView", "Taken"]
+
+
+@dataclass(slots=True)
+class Taken:
+    """What the drive took of one call.
+
+    Attributes:
+        writes: How many writes it confirmed.
+    """
+
+    writes: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +37,7 @@ class DriveView:
         identity: Whether it is what its profile says, and still the one it was.
         halts: How often it had been told to halt when this view was made for a start: where it was told to since, this
             view writes nothing any more.
+        taken: What the drive took of the call that this view was made for, where that is counted.
     """
 
     bus: AwaitableBus
@@ -34,6 +46,7 @@ class DriveView:
     record: UnitRecord
     identity: SameUnit
     halts: int | None = None
+    taken: Taken | None = None
 
     @classmethod
     def create(

@@ -29,6 +29,11 @@ _ASKED_FOR = 1.0
 """Seconds of the line's clock for which a unit that does not show a halt is asked what it is, while it is not heard."""
 
 
+_TO_SAY = 2.0
+"""Seconds of the line's clock in which a unit says what it is, on a line that was just opened and loses an answer: there
+one question alone takes a second."""
+
+
 class Halt:
     """One unit that is to be halted.
 
@@ -63,8 +68,10 @@ class Halt:
 
     @property
     def is_over(self) -> bool:
-        """Whether its time has passed."""
-        return self.unit.bus.now() >= self._until
+        """Whether its time has passed: of a unit that speaks, but did not say yet what it is, no less than it takes to."""
+        now = self.unit.bus.now()
+        is_asked = self._heard is not None and not self._told and not self.unit.bus.closed
+        return now >= (max(self._until, self._began + _TO_SAY) if is_asked else self._until)
 
     async def until_taken(self) -> None:
         """Sends until the unit takes it.

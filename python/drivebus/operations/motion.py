@@ -16,6 +16,7 @@ from drivebus.operations.aim import check_harmless
 from drivebus.operations.by_name import by_name
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.halting import WITHIN, Halt
+from drivebus.operations.in_parts import in_parts
 from drivebus.operations.program_end import before_start
 from drivebus.operations.stop_proof import Fall
 from drivebus.values import ControlSource, State
@@ -36,6 +37,7 @@ __all__ = [
 
 
 @by_name("reverse", after=1)
+@in_parts
 async def run(
     unit: DriveView,
     hz: float | None = None,
@@ -90,6 +92,7 @@ async def run(
 
 
 @by_name("reverse", after=0)
+@in_parts
 async def jog(
     unit: DriveView, *, reverse: bool = False, confirm: float = 1.0, force: bool = False, unverified: bool = False
 ) -> None:
@@ -129,7 +132,8 @@ async def stop(unit: DriveView, *, confirm: float = 1.0, within: float = WITHIN,
 
     Args:
         confirm: Seconds for which the state is looked at; 0 does not look.
-        within: Seconds, 0..3600, for which it is sent until the drive takes it.
+        within: Seconds, 0..3600, for which it is sent until the drive takes it. A unit that answers, but has not said
+            yet what it is, is asked for two seconds in any case.
         unverified: Also where the command is not verified for the family.
 
     Raises:

@@ -15,6 +15,7 @@ from drivebus.advice import Advice, Text, argument, call, joined
 from drivebus.errors import BadArgument, DrivebusError, NotReady
 from drivebus.operations import parameter_writes, registers, state, unit_variants
 from drivebus.operations.drive_view import DriveView
+from drivebus.operations.in_parts import counted
 from drivebus.operations.parameter_writes import Planned, key
 from drivebus.profile.evidence import Evidence
 from drivebus.values import Description, Value
@@ -78,7 +79,7 @@ async def write(
             note has what it shows.
         Unconfirmed: The drive shows another value, however often it was written.
 
-    Where one of several fails, those before it were written; the error's note names them.
+    Where one of several fails, those before it were written: the error's `in_part` is true, and its note names them.
     """
     if not isinstance(name, (str, Mapping)):
         raise BadArgument(
@@ -94,14 +95,15 @@ async def write(
     planned = [plan_write(unit, each, asked, store) for each, asked in wanted.items()]
     await check_now(unit, planned)
     done: list[str] = []
-    for run in _runs(unit, planned):
-        try:
-            await parameter_writes.write(unit, run, store)
-        except DrivebusError as error:
-            if done and hasattr(error, "add_note"):
-                error.add_note(f"written before it: {', '.join(done)}")
-            raise
-        done += [item.name for item in run]
+    with counted(unit) as view:
+        for run in _runs(unit, planned):
+            try:
+                await parameter_writes.write(view, run, store)
+            except DrivebusError as error:
+                if done and hasattr(error, "add_note"):
+                    error.add_note(f"written before it: {', '.join(done)}")
+                raise
+            done += [item.name for item in run]
 
 
 def _runs(unit: DriveView, planned: Sequence[Planned]) -> Iterator[list[Planned]]:

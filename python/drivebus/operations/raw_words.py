@@ -140,8 +140,15 @@ async def send(
         # Where the words can be read, the bus has looked whether they are there.
         if error.means != "taken":
             raise
+        _count(unit)
         return False
+    _count(unit)
     return True
+
+
+def _count(unit: DriveView) -> None:
+    if unit.taken is not None:
+        unit.taken.writes += 1
 
 
 @contextmanager
