@@ -257,6 +257,7 @@ FUZZ       := $(CARGO_FUZZ) fuzz run --features libfuzzer --sanitizer none
 FUZZ_FOUND := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)/fuzz
 TARGET     ?= $(basename $(notdir $(wildcard fuzz/targets/*)))
 TIME       ?= 60
+LEN        ?= 2048
 # What is fuzzed from Python runs under atheris, which is libFuzzer for it, in an environment of its own.
 FUZZ_VENV  := .venv-fuzz
 IN_PYTHON  := $(basename $(notdir $(wildcard fuzz/targets/*.py)))
@@ -278,13 +279,13 @@ FUZZ_RUN = if [ -f fuzz/targets/$$target.py ]; \
     then run="$(FUZZ_VENV)/bin/python -m fuzz.targets.$$target -artifact_prefix=$(FUZZ_FOUND)/" then=; \
     else run="$(FUZZ) $$target" then=--; fi
 
-fuzz: $(FUZZ_NEEDS) ## TIME in seconds for each TARGET
+fuzz: $(FUZZ_NEEDS) ## TIME in seconds for each TARGET, with inputs of LEN bytes at most
 	@set -e; for target in $(TARGET); do \
 	    mkdir -p $(FUZZ_FOUND)/$$target; \
 	    echo "make fuzz: $$target, $(TIME) s"; \
 	    $(FUZZ_RUN); \
 	    $$run $(FUZZ_FOUND)/$$target fuzz/corpus/$$target $$then \
-	        -max_total_time=$(TIME) -max_len=2048 -rss_limit_mb=512 -timeout=10 -print_final_stats=1; \
+	        -max_total_time=$(TIME) -max_len=$(LEN) -rss_limit_mb=512 -timeout=10 -print_final_stats=1; \
 	done
 
 fuzz-corpus: $(FUZZ_NEEDS) ## adds what reaches code that nothing in fuzz/corpus reaches

@@ -2,7 +2,8 @@
 
 use crate::gateway::asked::{Asked, NotModbus};
 use crate::gateway::framing::Framing;
-use crate::gateway::{rtu_request, tcp_request};
+use crate::gateway::rtu_request::{self, Looked};
+use crate::gateway::tcp_request;
 
 /// The requests in what comes over one connection, in whatever pieces it comes.
 ///
@@ -12,6 +13,7 @@ pub struct Requests {
     framing: Framing,
     /// What is not taken apart yet.
     bytes: Vec<u8>,
+    looked: Looked,
     wrong: Option<NotModbus>,
 }
 
@@ -35,7 +37,7 @@ impl Requests {
         let outcome = loop {
             let first = match self.framing {
                 Framing::Tcp => tcp_request::first(rest),
-                Framing::Rtu => rtu_request::first(rest),
+                Framing::Rtu => rtu_request::first(rest, &mut self.looked),
             };
             match first {
                 Ok(Some((asked, behind))) => {
