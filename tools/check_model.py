@@ -317,8 +317,8 @@ BREAKS = [
     Break(
         "nor where another kind displaces it",
         DOUBT,
-        "self.enter(now, (unit, expected, false), window, since);",
-        "self.enter(now, (unit, expected, false), window, now.max(since));",
+        "self.enter(now, (unit, expected, because), window, since);",
+        "self.enter(now, (unit, expected, because), window, now.max(since));",
         # A read given up is displaced by the refusal of a longer one, and this by that of the first: nine seconds pass.
         "overtaking-one --requests 5 --refusals 1 --quits 2 --retries 0",
     ),
