@@ -28,6 +28,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 
 DOUBT = "crates/rtu/src/doubt.rs"
+ATTRIBUTION = "crates/rtu/src/doubt/attribution.rs"
 DAMAGED = "crates/rtu/src/doubt/damaged.rs"
 OWED = "crates/rtu/src/doubt/owed.rs"
 LENGTHS = "crates/rtu/src/doubt/lengths.rs"
@@ -332,28 +333,28 @@ BREAKS = [
     ),
     Break(
         "one answer more than could be mistaken",
-        DOUBT,
+        ATTRIBUTION,
         "words = words.saturating_add(open.count);",
         "",
         "overtaking --requests 4 --faults 0",
     ),
     Break(
         "and one refusal more",
-        DOUBT,
+        ATTRIBUTION,
         "refusal = refusal.saturating_add(open.count);",
         "",
         "overtaking --requests 3 --refusals 1 --retries 0",
     ),
     Break(
         "as many as the unit owes can come",
-        DOUBT,
+        ATTRIBUTION,
         "let most = 1 + self.owed(unit).max(1);",
         "let most = 2;",
         "overtaking --requests 5 --faults 0",
     ),
     Break(
         "a write waits",
-        DOUBT,
+        ATTRIBUTION,
         "Some(latest) if !expected.is_read() => Attribution::Wait(latest),",
         "",
         "overtaking-commands --requests 4 --refusals 0",
@@ -419,7 +420,7 @@ BREAKS = [
     ),
     Break(
         "the answer to a read of any length may be taken for that to any other",
-        DOUBT,
+        ATTRIBUTION,
         "if self.could_pass(open, expected) {\n                words",
         "if open.expected.could_pass_for(expected) {\n                words",
         "other-lengths",
