@@ -199,7 +199,7 @@ BREAKS = [
         "in-order --lingers 0 --faults 0",
         beside=ONE_TIME,
     ),
-    Break("what is left open puts the unit in doubt", DOUBT, "self.open.insert(unit);", "", "in-order"),
+    Break("what is left open puts the unit in doubt", DOUBT, "self.open.insert(what.0);", "", "in-order"),
     # --- the quarantine
     Break(
         "nothing that could be mistaken is asked in quarantine",

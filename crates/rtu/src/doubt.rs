@@ -151,8 +151,12 @@ impl Doubts {
 
     /// `unit` was asked for `expected` with a time-out of `timeout`, and at `now` the answer is given up.
     pub(crate) fn left_open(&mut self, now: Instant, unit: UnitAddress, expected: Expected, timeout: Duration) {
-        self.enter(now, (unit, expected, Because::NoneCame), window(timeout), now);
-        self.open.insert(unit);
+        self.leave_open(now, (unit, expected, Because::NoneCame), timeout);
+    }
+
+    fn leave_open(&mut self, now: Instant, what: (UnitAddress, Expected, Because), timeout: Duration) {
+        self.enter(now, what, window(timeout), now);
+        self.open.insert(what.0);
     }
 
     /// The same, but a refusal came, which is its own or that of another that is open. `others`: or that of another master.
@@ -164,8 +168,7 @@ impl Doubts {
         others: bool,
     ) {
         let because = if self.owed(unit) > 0 { self.taken_because(now, unit, others) } else { Because::NoneCame };
-        self.enter(now, (unit, expected, because), window(timeout), now);
-        self.open.insert(unit);
+        self.leave_open(now, (unit, expected, because), timeout);
     }
 
     /// Why `unit` may still answer where something came of it that may have been the answer to something else.

@@ -1,6 +1,8 @@
 //! As many answers can come as the unit owes: where one was taken that may have been another's, one of the two is open.
 
 use drivebus_rtu::*;
+use proptest::collection::vec;
+use proptest::prelude::*;
 
 use crate::asker::{Asker, Came, ms, read, refuses, unit, words};
 
@@ -83,4 +85,83 @@ fn where_others_ask_nothing_is_told_by_what_came() {
     asker.echoes(1_500, unit(1));
     refused(&mut asker, 2_000, 1);
     assert_eq!(asker.attribution(ms(2_000), &read(3)), repeat(1, 3));
+}
+
+fn pdu(frame: &Adu) -> &[u8] {
+    let bytes = frame.as_bytes();
+    &bytes[1..bytes.len() - 2]
+}
+
+/// A unit on a line where answers overtake each other: what it was asked and has not answered.
+struct Owing {
+    asker: Asker,
+    now: u64,
+    owed: Vec<Request<'static>>,
+}
+
+impl Owing {
+    /// The right answer: each register has its own number for a word, and those from 8 on are refused, each by its own code.
+    fn right(request: &Request<'_>) -> Adu {
+        let Request::Read { address, count, .. } = *request else { panic!("only reads are asked") };
+        match u8::try_from(address).unwrap() {
+            refused @ 8.. => Adu::answer(unit(1), &Answer::exception(3, ExceptionCode(refused))),
+            value => words(unit(1), count, value.into()),
+        }
+    }
+
+    fn leaves_open(&mut self, request: Request<'static>) {
+        self.now += 1;
+        self.asker.leaves_open(self.now, unit(1), &request);
+        self.asker.echoes(self.now, unit(1));
+        self.owed.push(request);
+    }
+
+    /// Asks until the answers agree. Of what could be taken for the answer, `late` says which comes: the right one, or one that
+    /// is owed.
+    fn asks(&mut self, request: Request<'static>, mut late: impl Iterator<Item = u8>) {
+        let attribution = self.asker.attribution(ms(self.now), &request);
+        let mut agreement = Agreement::new(attribution, 1);
+        if matches!(attribution, Attribution::Wait(_)) {
+            return;
+        }
+        while !agreement.is_in_vain() {
+            self.now += 1;
+            self.owed.push(request);
+            let fits = |owed: &&Request<'_>| request.judge(pdu(&Self::right(owed))).is_ok();
+            let candidates = self.owed.iter().filter(fits).count();
+            let which = usize::from(late.next().unwrap_or(u8::MAX)).min(candidates - 1);
+            let came = *self.owed.iter().filter(fits).nth(which).unwrap();
+            let place = self.owed.iter().position(|owed| *owed == came).unwrap();
+            self.owed.remove(place);
+            let frame = Self::right(&came);
+            assert!(matches!(self.asker.asks(self.now, unit(1), &request, &frame), Came::Answer | Came::Refusal));
+            let answer = request.judge(pdu(&frame)).unwrap();
+            if agreement.hear(unit(1), &answer) {
+                assert_eq!(frame.as_bytes(), Self::right(&request).as_bytes(), "{came:?} was believed: {request:?}");
+                return;
+            }
+        }
+    }
+}
+
+fn reads() -> impl Strategy<Value = Request<'static>> {
+    (prop_oneof![Just(1_u16), Just(2), Just(8), Just(9)], prop_oneof![3 => Just(1_u16), 1 => Just(2)])
+        .prop_map(|(address, count)| Request::read(address, count).unwrap())
+}
+
+proptest! {
+    /// Whatever is left open, and whichever of the answers that could be meant comes first: none is believed that is not the own.
+    #[test]
+    fn no_late_answer_is_believed(
+        steps in vec((any::<bool>(), reads(), vec(0_u8..4, 0..12)), 1..14),
+    ) {
+        let mut owing = Owing { asker: Asker::of_a_unit_that_echoes(), now: 1, owed: Vec::new() };
+        for (is_left, request, late) in steps {
+            if is_left {
+                owing.leaves_open(request);
+            } else {
+                owing.asks(request, late.into_iter());
+            }
+        }
+    }
 }
