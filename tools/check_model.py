@@ -346,13 +346,6 @@ BREAKS = [
         "overtaking --requests 3 --refusals 1 --retries 0",
     ),
     Break(
-        "as many as the unit owes can come",
-        ATTRIBUTION,
-        "let most = 1 + self.owed(unit).max(1);",
-        "let most = 2;",
-        "overtaking --requests 5 --faults 0",
-    ),
-    Break(
         "a write waits",
         ATTRIBUTION,
         "Some(latest) if !expected.is_read() => Attribution::Wait(latest),",
