@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 CRATES: dict[str, set[str]] = {
     "rtu": set(),
     "drives": set(),
-    "drive": {"drives"},
+    "drive": {"rtu", "drives"},
     "line": {"rtu"},
     "sim": {"rtu", "drives", "line"},
     "drivebus": {"rtu", "drives", "drive", "line", "sim"},

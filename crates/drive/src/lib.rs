@@ -1,4 +1,4 @@
-//! What may be asked of a drive where its documents are silent.
+//! What may be asked of a drive where its documents are silent, and which drive it is where a word may do harm.
 //!
 //! What documents of the very family print may be used. What they print in part, or for a sister series, may be read;
 //! written it is only for who [trusts](Rule::trusting) what is not verified, and so is whatever they do not print at all.
@@ -25,16 +25,39 @@
 //! # }
 //! ```
 //!
+//! Units are named by people, and people mistake one drive for another: the word that stops one family starts another.
+//! [`Families`] knows whom a word would harm, and [`Apart`] which few words to ask a unit for before it is sent.
+//!
 //! # Rooms
 //!
 //! | room | what is in it |
 //! | --- | --- |
 //! | `rule` | may it be read, written, commanded; and why not |
+//! | `answer` | what a unit says that is asked for a word, and what its refusals tell |
+//! | `codes` | identification codes: where they stand, and what is listed of each |
+//! | `family`, `families` | a family by what its units answer and refuse; all that a unit may be of |
+//! | `harm` | what a word that is meant for one family does to another |
+//! | `contradiction` | what speaks against a family |
+//! | `apart` | which family a unit may be, and what to ask it next |
 
 #![forbid(unsafe_code)]
 
+mod answer;
+mod apart;
+mod codes;
+mod contradiction;
+mod families;
+mod family;
+mod harm;
 mod rule;
 
+pub use answer::{Answer, Said, meanings};
+pub use apart::{Apart, Verdict};
+pub use codes::Codes;
+pub use contradiction::Contradiction;
+pub use families::Families;
+pub use family::{Family, HALTS};
+pub use harm::What;
 pub use rule::{Rule, WhyNot};
 
 /// The examples of the README are tests.

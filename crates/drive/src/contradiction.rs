@@ -1,0 +1,109 @@
+//! Whether what a unit says of itself speaks against the family that it was named as.
+//!
+//! What speaks against one is only what documents or other programs say of another family: a code that is listed for that,
+//! or a word that units of the named one always have, refused as an address that there is none. An unknown code tells
+//! nothing, for firmwares differ; nor does a locked drive, nor a silent one.
+
+use drivebus_drives::{Evidence, Identification, Place, Table};
+use drivebus_rtu::ExceptionCode;
+
+use crate::answer::{Answer, Said};
+use crate::codes;
+use crate::family::Family;
+
+/// What speaks against a family.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Contradiction<'f> {
+    /// The unit gave a code of other families.
+    Code {
+        /// Where it was asked.
+        place: Place,
+        /// The code.
+        word: u16,
+        /// What is listed of it; never empty.
+        rows: Vec<&'f Identification>,
+    },
+    /// The unit says that it has no such address, and each unit of the family has.
+    NoAddress {
+        /// Where it was asked.
+        place: Place,
+        /// How it refused.
+        code: ExceptionCode,
+    },
+    /// The unit says that it does not know the function that reads there, and each unit of the family does.
+    NoFunction {
+        /// Where it was asked.
+        place: Place,
+        /// How it refused.
+        code: ExceptionCode,
+    },
+}
+
+impl Family {
+    /// What among `answers` speaks against this family; `None` if nothing does.
+    ///
+    /// A code says most: what the unit is, and not only what it is not.
+    pub fn contradiction(&self, answers: &[Answer]) -> Option<Contradiction<'_>> {
+        if !self.is_known_by_something() {
+            return None;
+        }
+        let by_code = answers.iter().find_map(|&answer| self.by_code(answer));
+        by_code.or_else(|| answers.iter().find_map(|&answer| self.by_refusal(answer)))
+    }
+
+    /// Whether one of its units would hardly give these `answers`, so that it is worth asking what else it may be.
+    ///
+    /// It is not what speaks against the family: firmwares differ, and so do editions of manuals.
+    pub fn is_suspicious(&self, answers: &[Answer]) -> bool {
+        self.is_known_by_something() && answers.iter().any(|&answer| self.is_surprised_by(answer))
+    }
+
+    /// Not so of somebody's own that says nothing of how its units are known: they may be anything.
+    fn is_known_by_something(&self) -> bool {
+        self.profile().role("identification").is_some() || self.signature().is_some() || self.is_shipped()
+    }
+
+    fn by_code(&self, answer: Answer) -> Option<Contradiction<'_>> {
+        let (place, word) = (answer.place, answer.word()?);
+        let rows: Vec<_> = self.rows(place, word).collect();
+        let is_own = rows.iter().any(|row| codes::is_own(self.profile(), row));
+        (!rows.is_empty() && !is_own).then_some(Contradiction::Code { place, word, rows })
+    }
+
+    fn by_refusal(&self, answer: Answer) -> Option<Contradiction<'_>> {
+        let (place, code) = (answer.place, answer.exception()?);
+        if !self.must_have(place) {
+            return None;
+        }
+        if place.table != Table::Holding && code == ExceptionCode::ILLEGAL_FUNCTION {
+            return Some(Contradiction::NoFunction { place, code });
+        }
+        self.lacks_address(code).then_some(Contradiction::NoAddress { place, code })
+    }
+
+    /// Whether each of its units answers at `place`, by its signature or because its code stands there.
+    fn must_have(&self, place: Place) -> bool {
+        let is_signed = self.signature().is_some_and(|signature| signature.answers.contains(&place));
+        // A row that was only taken over from a sister proves nothing, unless a code is listed that would stand there.
+        let is_printed = || {
+            let register = self.profile().role("identification");
+            register.is_some_and(|entry| entry.evidence() == Evidence::Verified)
+        };
+        is_signed || self.code_place() == Some(place) && (self.is_listed() || is_printed())
+    }
+
+    /// Whether `answer` is not what one of its units says there; what its signature says it refuses, it has not.
+    fn is_surprised_by(&self, answer: Answer) -> bool {
+        let place = answer.place;
+        match answer.said {
+            // It has nothing there, as is right, and says so in the words of another family.
+            Said::Refused(code) if !self.has(place) => !self.lacks_address(code),
+            Said::Refused(_) => !self.refuses(place),
+            Said::Word(_) if self.refuses(place) => true,
+            // A word that no list has for it: another maker keeps his speed there.
+            Said::Word(word) if self.codes().places().contains(&place) => !self.is_own(place, word),
+            Said::Word(word) => self.state_place() == Some(place) && !self.knows_state(word),
+        }
+    }
+}
