@@ -14,13 +14,17 @@ from drivebus.errors import Decision
 
 _T_co = TypeVar("_T_co", covariant=True)
 _Piece: TypeAlias = tuple[str, bytes, float, float, float | None, float, float | None, str | None]
+_Answer: TypeAlias = tuple[int, int | None, int | None]
 _Writable: TypeAlias = tuple[str, int, list[int] | None, str, int | None, str, int | None]
 
 __version__: Final[str]
 __all__ = [
+    "HALTS",
+    "Apart",
     "Asked",
     "Batch",
     "Bus",
+    "Family",
     "Gateway",
     "Mailbox",
     "Plan",
@@ -36,6 +40,8 @@ __all__ = [
     "__version__",
     "begin_of_child",
     "check_port_options",
+    "code_places",
+    "code_rows",
     "crc16",
     "decode",
     "decode_answer",
@@ -49,15 +55,20 @@ __all__ = [
     "frames_in",
     "is_write",
     "judge",
+    "listed_codes",
     "misses",
     "only_reads",
     "open_bus",
+    "passes",
     "port_facts",
     "port_url",
     "read_sheet",
     "run_time_folder",
     "touched",
 ]
+
+HALTS: Final[tuple[str, str, str]]
+"""The commands that end a motion, in the order of who else may stand in for one that a family lacks."""
 
 def crc16(data: Buffer, /) -> int:
     """CRC-16/MODBUS of *data*: 0..=0xFFFF. On the wire its low byte goes first."""
@@ -497,6 +508,75 @@ class Rule:
     def command(self, name: str, /) -> tuple[str, str] | None: ...
     def state(self) -> tuple[str, str] | None: ...
     def fault(self) -> tuple[str, str] | None: ...
+
+@final
+class Family:
+    """One family of drives, by what its units answer and refuse.
+
+    Places are numbers as `tables` has them, of a holding register its address. Answers are tuples of the place, the
+    word that came or None, and the exception by which it was refused or None. What is to be sent is a command by its
+    name, or a place that any word may be written to. NotAllowed: there is no such place or command.
+    """
+
+    def __new__(cls, profile: Profile, /) -> Family: ...
+    @property
+    def is_listed(self) -> bool:
+        """Whether its profile or a shipped one lists a code of the family."""
+    @property
+    def signature(self) -> tuple[list[int], list[int]] | None:
+        """The places that its units answer, and those that they refuse; that of the family below an overlay."""
+    def is_own(self, place: int, word: int, /) -> bool:
+        """Whether *word* (0..=0xFFFF) at *place* is a code of a family that its units report as."""
+    def is_signed_by(self, answers: Sequence[_Answer], /) -> bool:
+        """Whether *answers* have all of its signature."""
+    def lacks_address(self, code: int, /) -> bool:
+        """Whether its units say by the exception *code* (0..=0xFF) that they have no such address."""
+    def is_put_off_by(self, answer: _Answer, /) -> bool:
+        """Whether *answer* is a refusal that passes, and so tells nothing of one of its units."""
+    def halt_for(self, command: str, /) -> str | None:
+        """The command by which its units do what *command* is for; None where they have none that halts."""
+    def harmed(self, what: str | int, /) -> list[str]:
+        """The shipped families that *what* does harm to where it is written to a unit named as one of this family."""
+    def is_harmed_by(self, what: str | int, named: Family, /) -> bool:
+        """Whether *what*, written to a unit that was named as one of *named*, does harm to one of this family."""
+    def contradiction(self, answers: Sequence[_Answer], /) -> tuple[str, int, int, list[dict[str, Any]]] | None:
+        """What speaks against it: of which kind, where, the word or the exception that came, and the rows of a code.
+
+        Kinds are `code`, `no_address` and `no_function`.
+        """
+    def is_suspicious(self, answers: Sequence[_Answer], /) -> bool:
+        """Whether one of its units would hardly give these *answers*."""
+
+@final
+class Apart:
+    """The families that one unit may be, told apart by its answers, which are as for `Family`."""
+
+    def __new__(cls, named: Family, trusted: bool, /) -> Apart: ...
+    @property
+    def is_asked(self) -> bool:
+        """Whether the unit told anything yet."""
+    @property
+    def shows_named(self) -> bool:
+        """Whether the answers show a unit of what it was named as, and nothing speaks against that."""
+    def heard(self, answer: _Answer, /) -> bool:
+        """Takes *answer* into account. Whether it tells anything."""
+    def verdict(self, what: str | int, /) -> tuple[int | None, str | None, list[str]]:
+        """The place to ask; else the family to take the unit for; else those that it may be, which may be none.
+
+        NotAllowed: there is no such place or command.
+        """
+
+def code_places() -> list[int]:
+    """Where units of the shipped families keep their codes."""
+
+def code_rows(place: int, word: int, /) -> list[dict[str, Any]]:
+    """What the shipped profiles list of the code *word* (0..=0xFFFF), if codes stand at *place*."""
+
+def listed_codes() -> list[int]:
+    """Every code that a shipped profile lists."""
+
+def passes(answer: _Answer, /) -> bool:
+    """Whether *answer* is a refusal that passes, whatever the unit is."""
 
 @final
 class Profile:

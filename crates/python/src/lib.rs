@@ -5,6 +5,7 @@
 
 use pyo3::prelude::*;
 
+mod apart;
 mod arguments;
 mod attendant;
 mod bus;
@@ -36,7 +37,10 @@ mod trace;
 #[pymodule(gil_used = false)]
 mod _native {
     use pyo3::prelude::*;
+    use pyo3::types::PyTuple;
 
+    #[pymodule_export]
+    use crate::apart::{Apart, Family, code_places, code_rows, listed_codes, passes};
     #[pymodule_export]
     use crate::bus::Bus;
     #[pymodule_export]
@@ -75,6 +79,7 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("HALTS", PyTuple::new(module.py(), crate::apart::halts())?)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use drivebus_drives::{self as drives, Command, Entry, Input, Means, Place, ProfileError, Setpoint, Store};
-use drivebus_rtu::{ExceptionCode, Meaning, Meanings};
+use drivebus_drives::{self as drives, Command, Entry, Input, Place, ProfileError, Setpoint, Store};
+use drivebus_rtu::{ExceptionCode, Meanings};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyString};
 
@@ -25,15 +25,9 @@ impl Profile {
         Arc::clone(&self.0)
     }
 
-    /// What its exceptions mean: what the profile says, and of the others what the specification does.
+    /// What its exceptions mean to this family.
     pub(crate) fn meanings(&self) -> Meanings {
-        self.0.exceptions().fold(Meanings::STANDARD, |meanings, row| match row.means {
-            None => meanings,
-            Some(Means::NoSuch) => meanings.with(ExceptionCode(row.code), Meaning::NoSuch),
-            Some(Means::NotNow) => meanings.with(ExceptionCode(row.code), Meaning::NotNow),
-            Some(Means::AskAgain) => meanings.with(ExceptionCode(row.code), Meaning::AskAgain),
-            Some(Means::Taken) => meanings.with(ExceptionCode(row.code), Meaning::Taken),
-        })
+        drivebus_drive::meanings(&self.0)
     }
 }
 

@@ -1,0 +1,214 @@
+//! `Family` and `Apart` for Python: what a unit may be, by what it answers, and whom a word would harm.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use drivebus_drive::{self as drive, Answer, Contradiction, Families, HALTS, Said, Verdict, What};
+use drivebus_drives::{Command, Place, Signature};
+use drivebus_rtu::ExceptionCode;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+
+use crate::convert::{place_of, shown};
+use crate::errors::{bad_argument, refuse};
+use crate::profile::Profile;
+use crate::tables;
+
+/// An answer: in Python a place, and the word that came or the exception by which it was refused.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Heard(Answer);
+
+impl<'py> FromPyObject<'_, 'py> for Heard {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let (place, word, code): (Bound<'py, PyAny>, Option<u16>, Option<u8>) = given.extract()?;
+        let said = word.map(Said::Word).or_else(|| code.map(|code| Said::Refused(ExceptionCode(code))));
+        let said = said.ok_or_else(|| bad_argument("an answer has a word or an exception".to_owned()))?;
+        Ok(Self(Answer { place: place_of(&place)?, said }))
+    }
+}
+
+/// What to ask, as what to take the unit, and else what it may be, each by its name.
+type Told = (Option<u32>, Option<String>, Vec<String>);
+
+/// What speaks against a family: of which kind, where, the word or the exception that came, and what is listed of a code.
+type Against<'py> = (&'static str, u32, u16, Vec<Bound<'py, PyDict>>);
+
+/// One family of drives, by what its units answer and refuse.
+#[pyclass(name = "Family", frozen, module = "drivebus._native")]
+#[derive(Debug)]
+pub(crate) struct Family(Arc<drive::Family>);
+
+#[pymethods]
+impl Family {
+    #[new]
+    #[pyo3(signature = (profile, /))]
+    fn new(profile: &Profile) -> Self {
+        Self(Families::shipped().family(&profile.core()))
+    }
+
+    #[getter]
+    fn is_listed(&self) -> bool {
+        self.0.is_listed()
+    }
+
+    #[getter]
+    fn signature(&self) -> Option<(Vec<u32>, Vec<u32>)> {
+        let numbers = |places: &[Place]| places.iter().map(|place| place.number()).collect();
+        self.0.signature().map(|Signature { answers, refuses, .. }| (numbers(answers), numbers(refuses)))
+    }
+
+    #[pyo3(signature = (place, word, /))]
+    fn is_own(&self, place: &Bound<'_, PyAny>, word: u16) -> PyResult<bool> {
+        Ok(self.0.is_own(place_of(place)?, word))
+    }
+
+    #[pyo3(signature = (answers, /))]
+    fn is_signed_by(&self, answers: Vec<Heard>) -> bool {
+        self.0.is_signed_by(&all(answers))
+    }
+
+    #[pyo3(signature = (code, /))]
+    fn lacks_address(&self, code: u8) -> bool {
+        self.0.lacks_address(ExceptionCode(code))
+    }
+
+    #[pyo3(signature = (answer, /))]
+    fn is_put_off_by(&self, answer: Heard) -> bool {
+        self.0.is_put_off_by(answer.0)
+    }
+
+    #[pyo3(signature = (command, /))]
+    fn halt_for(&self, command: &str) -> PyResult<Option<&'static str>> {
+        let command: Command = command.parse().map_err(refuse)?;
+        Ok(self.0.halt_for(command).map(Command::name))
+    }
+
+    #[pyo3(signature = (what, /))]
+    fn harmed(&self, what: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
+        Ok(names(&Families::shipped().harmed(what_of(what)?, &self.0)))
+    }
+
+    #[pyo3(signature = (what, named, /))]
+    fn is_harmed_by(&self, what: &Bound<'_, PyAny>, named: &Self) -> PyResult<bool> {
+        Ok(self.0.is_harmed_by(what_of(what)?, &named.0))
+    }
+
+    #[pyo3(signature = (answers, /))]
+    fn contradiction<'py>(&self, py: Python<'py>, answers: Vec<Heard>) -> PyResult<Option<Against<'py>>> {
+        let answers = all(answers);
+        let against = match self.0.contradiction(&answers) {
+            Some(Contradiction::Code { place, word, rows }) => {
+                let rows = rows.into_iter().map(|row| tables::identification(py, row)).collect::<PyResult<_>>()?;
+                ("code", place, word, rows)
+            }
+            Some(Contradiction::NoAddress { place, code }) => ("no_address", place, code.0.into(), Vec::new()),
+            Some(Contradiction::NoFunction { place, code }) => ("no_function", place, code.0.into(), Vec::new()),
+            _ => return Ok(None),
+        };
+        let (kind, place, said, rows) = against;
+        Ok(Some((kind, place.number(), said, rows)))
+    }
+
+    #[pyo3(signature = (answers, /))]
+    fn is_suspicious(&self, answers: Vec<Heard>) -> bool {
+        self.0.is_suspicious(&all(answers))
+    }
+}
+
+/// The families that one unit may be, told apart by its answers.
+#[pyclass(name = "Apart", frozen, module = "drivebus._native")]
+#[derive(Debug)]
+pub(crate) struct Apart(Mutex<drive::Apart>);
+
+impl Apart {
+    fn with<T>(&self, f: impl FnOnce(&mut drive::Apart) -> T) -> T {
+        f(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+#[pymethods]
+impl Apart {
+    #[new]
+    #[pyo3(signature = (named, trusted, /))]
+    fn new(named: &Family, trusted: bool) -> Self {
+        Self(Mutex::new(drive::Apart::new(&named.0, Families::shipped(), trusted)))
+    }
+
+    #[getter]
+    fn is_asked(&self) -> bool {
+        self.with(|apart| apart.is_asked())
+    }
+
+    #[getter]
+    fn shows_named(&self) -> bool {
+        self.with(|apart| apart.shows_named())
+    }
+
+    #[pyo3(signature = (answer, /))]
+    fn heard(&self, answer: Heard) -> bool {
+        self.with(|apart| apart.heard(answer.0))
+    }
+
+    #[pyo3(signature = (what, /))]
+    fn verdict(&self, what: &Bound<'_, PyAny>) -> PyResult<Told> {
+        let what = what_of(what)?;
+        Ok(match self.with(|apart| apart.verdict(what)) {
+            Verdict::Ask(place) => (Some(place.number()), None, Vec::new()),
+            Verdict::Take(family) => (None, Some(family.name().to_owned()), Vec::new()),
+            Verdict::Undecided(families) => (None, None, names(&families)),
+            // What a later core says besides decides nothing here.
+            _ => (None, None, Vec::new()),
+        })
+    }
+}
+
+/// The commands that end a motion, in the order of who else may stand in for one that a family lacks.
+pub(crate) fn halts() -> [&'static str; 3] {
+    HALTS.map(Command::name)
+}
+
+/// Where units of the shipped families keep their codes.
+#[pyfunction]
+pub(crate) fn code_places() -> Vec<u32> {
+    Families::shipped().codes().places().iter().map(|place| place.number()).collect()
+}
+
+/// Every code that a shipped profile lists.
+#[pyfunction]
+pub(crate) fn listed_codes() -> Vec<u16> {
+    Families::shipped().codes().all().collect()
+}
+
+/// What the shipped profiles list of a code; nothing where there is no such place.
+#[pyfunction]
+#[pyo3(signature = (place, word, /))]
+pub(crate) fn code_rows(py: Python<'_>, place: u32, word: u16) -> PyResult<Vec<Bound<'_, PyDict>>> {
+    let place = Place::of_number(place);
+    let rows = place.map_or(&[][..], |place| Families::shipped().codes().rows(place, word));
+    rows.iter().map(|row| tables::identification(py, row)).collect()
+}
+
+/// Whether an answer is a refusal that passes, whatever the unit is.
+#[pyfunction]
+#[pyo3(signature = (answer, /))]
+pub(crate) fn passes(answer: Heard) -> bool {
+    answer.0.passes()
+}
+
+fn names(families: &[Arc<drive::Family>]) -> Vec<String> {
+    families.iter().map(|family| family.name().to_owned()).collect()
+}
+
+fn all(answers: Vec<Heard>) -> Vec<Answer> {
+    answers.into_iter().map(|Heard(answer)| answer).collect()
+}
+
+/// A command by its name, or a place.
+fn what_of(given: &Bound<'_, PyAny>) -> PyResult<What> {
+    if !given.is_instance_of::<PyString>() {
+        return place_of(given).map(What::Word);
+    }
+    let name: String = given.extract().map_err(|_| bad_argument(format!("command {} is not a text", shown(given))))?;
+    name.parse().map(What::Command).map_err(refuse)
+}
