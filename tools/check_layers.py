@@ -105,6 +105,7 @@ ON_THE_CORE = {
     "capture",
     "sim",
     "line",
+    "identify",
     "operations",
     "backup",
     "poll",

@@ -73,8 +73,8 @@ def test_how_sure_it_is(
 
 
 def test_a_code_that_no_document_prints(simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch) -> None:
-    row = replace(codes.listed()[0x0180][0], verified=False, source="a program")
-    monkeypatch.setattr(codes, "listed", lambda: {0x0180: [row]})
+    row = replace(codes.listed_at(CODE, 0x0180)[0], verified=False, source="a program")
+    monkeypatch.setattr(codes, "listed_at", lambda _, word: [row] if word == 0x0180 else [])
     bus.read(1, CODE)  # first contact is over
     answer(simulator, 1, 0x0180)
     found = bus.identify(1)
@@ -200,7 +200,7 @@ def test_a_code_of_several_families_with_profiles_is_not_enough(
     rows = [
         IdentificationCode(0x010A, name, name.upper(), (), verified=True, note="", source="a manual") for name in names
     ]
-    monkeypatch.setattr("drivebus.identify.codes.listed", lambda: {0x010A: rows})
+    monkeypatch.setattr("drivebus.identify.codes.listed_at", lambda _, word: rows if word == 0x010A else [])
     found = bus.identify(2)
     assert (found.certainty, found.candidates, found.family) == ("shared", names, None)
     all_but_last = ", ".join(names[:-1])

@@ -6,13 +6,15 @@ programs alone. Whoever wants to know of a code asks here; the tables themselves
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable
+from typing import Any
 
-from drivebus.profile import Profile, profiles
+from drivebus import _native
+from drivebus.identify.family import family_of
+from drivebus.profile import Profile
 from drivebus.profile.facts import IdentificationCode
 
-__all__ = ["address_of", "are_own", "families_in", "is_listed", "listed", "listed_at", "listed_for", "registers"]
+__all__ = ["address_of", "all_listed", "families_in", "is_listed", "is_own", "listed_at", "registers", "rows_of"]
 
 
 def address_of(profile: Profile) -> int | None:
@@ -21,46 +23,37 @@ def address_of(profile: Profile) -> int | None:
     return None if register is None else profile.describe(register).place
 
 
-@functools.cache
 def registers() -> tuple[int, ...]:
     """The addresses where units of the shipped families keep their codes."""
-    addresses = map(address_of, map(Profile.builtin, profiles()))
-    return tuple(dict.fromkeys(address for address in addresses if address is not None))
+    return tuple(_native.code_places())
 
 
-@functools.cache
-def listed() -> dict[int, list[IdentificationCode]]:
-    """The rows of each code in the shipped profiles; of profiles that say the same of a family, the first."""
-    found: dict[int, dict[str, IdentificationCode]] = {}
-    for name in profiles():
-        for row in Profile.builtin(name).identifications():
-            known = found.setdefault(row.code, {}).setdefault(row.family, row)
-            if row.verified and not known.verified:
-                found[row.code][row.family] = row
-    return {code: list(rows.values()) for code, rows in found.items()}
+def all_listed() -> list[int]:
+    """Every code that a shipped profile lists."""
+    return _native.listed_codes()
 
 
 def listed_at(address: int, word: int) -> list[IdentificationCode]:
-    """The rows of the code *word*, if codes stand at *address*; elsewhere it is a word like any other."""
-    return listed().get(word, []) if address in registers() else []
+    """The rows of the code *word*, if codes stand at *address*; elsewhere it is a word like any other.
+
+    Of profiles that say the same of a family, the first.
+    """
+    return rows_of(_native.code_rows(address, word))
 
 
-def listed_for(profile: Profile, address: int, word: int) -> list[IdentificationCode]:
-    """The rows of the code *word* at *address* in *profile* itself, then those in the shipped ones."""
-    own = profile.identifications() if address == address_of(profile) else []
-    return [*(row for row in own if row.code == word), *listed_at(address, word)]
+def rows_of(native: Iterable[dict[str, Any]]) -> list[IdentificationCode]:
+    """Rows as the core has them."""
+    return [IdentificationCode(**{**row, "shared": tuple(row["shared"])}) for row in native]
 
 
-def are_own(profile: Profile, rows: Iterable[IdentificationCode]) -> bool:
-    """Whether *rows* of one code name a family that units of *profile* report as."""
-    return not set(families_in(rows)).isdisjoint(profile.reports_as())
+def is_own(profile: Profile, address: int, word: int) -> bool:
+    """Whether *word* at *address* is a code of a family that units of *profile* report as."""
+    return family_of(profile).is_own(address, word)
 
 
-@functools.lru_cache(maxsize=256)
 def is_listed(profile: Profile) -> bool:
     """Whether *profile* or a shipped one lists a code of the family of *profile*."""
-    rows = [*profile.identifications(), *(row for rows in listed().values() for row in rows)]
-    return any(row.family == profile.family for row in rows)
+    return family_of(profile).is_listed
 
 
 def families_in(rows: Iterable[IdentificationCode]) -> list[str]:

@@ -8,42 +8,37 @@ drive, nor a silent one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from drivebus import tables
 from drivebus.advice import Advice, Text, argument
 from drivebus.identify import codes
 from drivebus.identify.families import asked_as, one_of, shipped
-from drivebus.identify.refusals import NO_FUNCTION, Answer, no_such_address
-from drivebus.identify.signatures import signature_of
+from drivebus.identify.family import family_of
+from drivebus.identify.refusals import Answer
 from drivebus.profile import Profile, profiles
+from drivebus.profile.facts import IdentificationCode
 
 __all__ = ["contradiction", "is_suspicious", "other_signature"]
 
 
-def contradiction(profile: Profile, unit: int, answers: Iterable[Answer]) -> str | None:
+def contradiction(profile: Profile, unit: int, answers: Sequence[Answer]) -> str | None:
     """What among *answers* speaks against *profile*, and what to do about it; None if nothing does."""
-    if not _is_known_by_something(profile):
-        return None
-    told = list(answers)
-    # A code says most: what the unit is, and not only what it is not.
-    found = [judge(profile, unit, answer) for judge in (_by_code, _by_refusal) for answer in told]
-    against = next(filter(None, found), None)
+    against = family_of(profile).contradiction(answers)
     if against is None:
         return None
-    return _told(profile, unit, against)
+    kind, place, said, rows = against
+    if kind == "code":
+        return _told(profile, unit, _by_code(profile, unit, said, codes.rows_of(rows)))
+    return _told(profile, unit, _by_refusal(unit, kind, place, said))
 
 
-def is_suspicious(profile: Profile, answers: Iterable[Answer]) -> bool:
+def is_suspicious(profile: Profile, answers: Sequence[Answer]) -> bool:
     """Whether a unit of *profile* would hardly give these *answers*, so that it is worth asking what else it may be.
 
     It is not what speaks against the profile: firmwares differ, and so do editions of manuals.
     """
-    if not _is_known_by_something(profile):
-        return False
-    signature = signature_of(profile)
-    refused = () if signature is None else tuple(signature["refuses"])
-    return any(_surprises(profile, answer, refused) for answer in answers)
+    return family_of(profile).is_suspicious(answers)
 
 
 def other_signature(profile: Profile, unit: int, shown: Iterable[str]) -> str | None:
@@ -66,36 +61,9 @@ def _told(profile: Profile, unit: int, *against: str) -> Text:
     )
 
 
-def _is_known_by_something(profile: Profile) -> bool:
-    """Not so of a profile of somebody's own that says nothing of how its units are known: they may be anything."""
-    return bool(profile.role("identification") or signature_of(profile) or shipped(profile.reports_as()))
-
-
-def _surprises(profile: Profile, answer: Answer, refused: tuple[int, ...]) -> bool:
-    """Whether *answer* is not what a unit of *profile* says there; at *refused* it has nothing."""
-    if answer.word is None:
-        lacks = answer.exception is not None and no_such_address(profile, answer.exception)
-        if profile.name_at(answer.address) is None:
-            # It has nothing there, as is right, and says so in the words of another family.
-            return not lacks
-        return answer.address not in refused
-    if answer.address in refused:
-        return True
-    if answer.address in codes.registers():
-        # A word that no list has for it: another maker keeps his speed there.
-        rows = codes.listed_for(profile, answer.address, answer.word)
-        return not codes.are_own(profile, rows)
-    state = profile.role("state")
-    is_state = state is not None and profile.describe(state).place == answer.address
-    return is_state and profile.state(answer.word) == "unknown"
-
-
-def _by_code(profile: Profile, unit: int, answer: Answer) -> str | None:
-    """What speaks against *profile* if the word that came is the code of another family."""
-    rows = [] if answer.word is None else codes.listed_for(profile, answer.address, answer.word)
+def _by_code(profile: Profile, unit: int, code: int, rows: list[IdentificationCode]) -> Text:
+    """What speaks against *profile* if the word that came is the *code* of another family."""
     families = codes.families_in(rows)
-    if not families or codes.are_own(profile, rows):
-        return None
     titles = [f"{row.title} ({row.family})" for row in rows]
     also = [name for name in families if name not in [row.family for row in rows]]
     known = shipped(families)
@@ -103,33 +71,15 @@ def _by_code(profile: Profile, unit: int, answer: Answer) -> str | None:
     if profile.name not in profiles():
         more = f". If {profile.name} is meant for such units, list that code under [[identification.codes]] in it"
         then = Text(then, more)
-    return Text(f"it reports {answer.word:04X}H, the code of {one_of([*titles, *also])}: ", then)
+    return Text(f"it reports {code:04X}H, the code of {one_of([*titles, *also])}: ", then)
 
 
-def _by_refusal(profile: Profile, unit: int, answer: Answer) -> str | None:
-    """What speaks against *profile* if the unit says that it lacks an address which each unit of it has."""
-    if answer.exception is None or answer.address not in _must_have(profile):
-        return None
-    table, _ = tables.split(answer.address)
-    no_function = table != "holding" and answer.exception == NO_FUNCTION
-    if not no_function and not no_such_address(profile, answer.exception):
-        return None
-    what = "function" if no_function else "address"
+def _by_refusal(unit: int, kind: str, place: int, exception: int) -> Text:
+    """What speaks against a profile if the unit says that it lacks an address which each unit of it has."""
+    what = "function" if kind == "no_function" else "address"
     return Text(
-        f"it refuses {tables.shown(answer.address)} (exception {answer.exception:02X}H: there is no such {what}), "
-        "which each of those answers: see what it is (",
+        f"it refuses {tables.shown(place)} (exception {exception:02X}H: there is no such {what}), which each of those "
+        "answers: see what it is (",
         Advice("identify", unit, f"bus.identify({unit})"),
         ") and name that",
     )
-
-
-def _must_have(profile: Profile) -> tuple[int, ...]:
-    """The addresses that every unit of *profile* answers."""
-    signature = signature_of(profile)
-    answered = () if signature is None else tuple(signature["answers"])
-    place, register = codes.address_of(profile), profile.role("identification")
-    if place is None or register is None:
-        return answered
-    # A row that was only taken over from a sister proves nothing, unless a code is listed that would stand there.
-    sure = codes.is_listed(profile) or profile.describe(register).evidence == "verified"
-    return (*answered, place) if sure else answered

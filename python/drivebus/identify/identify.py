@@ -11,7 +11,8 @@ from drivebus import tables
 from drivebus.errors import BadAnswer, NoAnswer
 from drivebus.identify import codes, signatures
 from drivebus.identify.families import all_of, one_of, shipped
-from drivebus.identify.refusals import LOCKED, UNREACHED, answer_at, no_such_address
+from drivebus.identify.family import family_of
+from drivebus.identify.refusals import LOCKED, UNREACHED, answer_at
 from drivebus.identify.results import Certainty, Identification
 from drivebus.line.asking import Ask
 from drivebus.profile import Profile
@@ -98,7 +99,7 @@ async def _as_it_behaves(ask: Ask, found: Identification, place: int) -> Identif
     except (NoAnswer, BadAnswer):
         return found
     if answer.word is None:
-        if answer.exception is None or not no_such_address(known, answer.exception):
+        if answer.exception is None or not family_of(known).lacks_address(answer.exception):
             return found
         against = "refuses"
     else:

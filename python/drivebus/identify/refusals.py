@@ -4,27 +4,23 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from drivebus import tables
+from drivebus import _native, tables
 from drivebus.errors import BadAnswer, Refused
+from drivebus.identify.family import family_of
 from drivebus.line.asking import Ask, Read
-from drivebus.profile import Profile, standard_means
+from drivebus.profile import Profile
 
 __all__ = [
     "LOCKED",
-    "NO_FUNCTION",
     "UNREACHED",
     "Answer",
     "answer_at",
     "answer_once",
-    "no_such_address",
     "passes",
     "tells_nothing",
 ]
 
-_ILLEGAL_ADDRESS = 0x02
-"""In the Modbus specification, and under this name in the profiles that list their exceptions."""
-
-NO_FUNCTION = 0x01
+_NO_FUNCTION = 0x01
 """In the Modbus specification: the unit does not know the function, and so has no such table."""
 
 LOCKED = 0x09
@@ -48,22 +44,14 @@ class Answer(NamedTuple):
     exception: int | None
 
 
-def no_such_address(profile: Profile, exception: int) -> bool:
-    """Whether a unit of *profile* says by *exception* that it has no such address."""
-    name, _ = profile.exception(exception)
-    return exception == _ILLEGAL_ADDRESS or name == "illegal_address"
-
-
 def passes(answer: Answer) -> bool:
     """Whether *answer* is a refusal that passes, whatever the unit is."""
-    code = answer.exception
-    return code is not None and (code in (LOCKED, *UNREACHED) or standard_means(code) == _ASK_AGAIN)
+    return _native.passes(answer)
 
 
 def tells_nothing(profile: Profile, answer: Answer) -> bool:
     """Whether *answer* is a refusal that passes, and so tells nothing of a unit of *profile*."""
-    code = answer.exception
-    return code is not None and (passes(answer) or profile.exception_means(code) == _ASK_AGAIN)
+    return family_of(profile).is_put_off_by(answer)
 
 
 async def answer_once(ask: Ask, unit: int, place: int) -> Answer:
@@ -92,7 +80,7 @@ async def answer_at(ask: Ask, unit: int, place: int) -> Answer:
             [word] = await ask(read)
         except Refused as error:
             decides = error.code in UNREACHED or error.means != _ASK_AGAIN
-            odd = error.code == NO_FUNCTION and read.table == "holding"
+            odd = error.code == _NO_FUNCTION and read.table == "holding"
             if again < _AGAIN and (odd or not decides):
                 again += 1
                 continue

@@ -182,14 +182,13 @@ class SameUnit:
     def _is_told(self, answers: Sequence[Answer]) -> bool:
         """Whether *answers* have the code of the family itself, or its whole signature."""
         code = [
-            answer.word is not None
-            and codes.are_own(self._profile, codes.listed_for(self._profile, answer.address, answer.word))
+            answer.word is not None and codes.is_own(self._profile, answer.address, answer.word)
             for answer in answers
             if answer.address in self._words
         ]
         if code:
             return all(code)
-        return shows(signature_of(self._profile), answers)
+        return shows(self._profile, answers)
 
     async def contradiction(self, bus: AwaitableBus, *, urgent: bool = False) -> str | None:
         """What the unit says against its profile, and what to do; None if nothing. Asks it in any case."""

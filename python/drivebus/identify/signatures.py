@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 from drivebus.errors import BadAnswer, NoAnswer
+from drivebus.identify.family import family_of
 from drivebus.identify.refusals import Answer, answer_at, passes
 from drivebus.line.asking import Ask
 from drivebus.profile import Profile, profiles
@@ -25,17 +26,17 @@ def listed() -> dict[str, Signature]:
 
 def signature_of(profile: Profile) -> Signature | None:
     """The signature of *profile*; an overlay has that of the family below it."""
-    return profile.signature() or listed().get(profile.family)
+    own = profile.signature()
+    if own is not None:
+        # That is read without a look at all other families.
+        return own
+    below = family_of(profile).signature
+    return None if below is None else {"answers": below[0], "refuses": below[1]}
 
 
-def shows(signature: Signature | None, answers: Iterable[Answer]) -> bool:
-    """Whether *answers* have all of *signature*: each word that such a unit answers, and a refusal of each other."""
-    if signature is None:
-        return False
-    answered = {answer.address: answer.word is not None for answer in answers}
-    return all(answered.get(place) is True for place in signature["answers"]) and all(
-        answered.get(place) is False for place in signature["refuses"]
-    )
+def shows(profile: Profile, answers: Sequence[Answer]) -> bool:
+    """Whether *answers* have all that such a unit is told by: each word that it answers, a refusal of each other."""
+    return family_of(profile).is_signed_by(answers)
 
 
 async def shown_by(ask: Ask, unit: int, answered: dict[int, bool]) -> tuple[str, ...]:

@@ -102,6 +102,6 @@ def look_of(profile: Profile) -> tuple[bytes, tuple[bytes, ...]] | None:
         return None
     table, address = tables.split(at)
     function = _READ[table]
-    others = [code for code in codes.listed() if contradiction(profile, 1, [Answer(at, code, None)]) is not None]
+    others = [code for code in codes.all_listed() if contradiction(profile, 1, [Answer(at, code, None)]) is not None]
     question = bytes([function]) + address.to_bytes(2, "big") + b"\0\1"
     return question, tuple(bytes([function, 2]) + code.to_bytes(2, "big") for code in others)
