@@ -3,6 +3,6 @@
 `profile` holds a family, `plan` the fewest reads for some names, `evidence` the rule for what no document proves.
 """
 
-from drivebus.profile.profile import Profile, native_of, profiles, standard_means
+from drivebus.profile.profile import Profile, native_of, profiles
 
-__all__ = ["Profile", "native_of", "profiles", "standard_means"]
+__all__ = ["Profile", "native_of", "profiles"]

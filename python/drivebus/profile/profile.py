@@ -24,7 +24,7 @@ from drivebus.profile.facts import (
 from drivebus.profile.plan import ReadPlan
 from drivebus.values import Description, Fault, WatchdogSettings
 
-__all__ = ["Profile", "native_of", "profiles", "standard_means"]
+__all__ = ["Profile", "native_of", "profiles"]
 
 _PLANS_KEPT = 256
 """Plans of one profile that are kept for the next time; a program asks for the same few names again and again."""
@@ -449,11 +449,6 @@ def profiles() -> list[str]:
 def native_of(profile: Profile) -> _native.Profile:
     """What *profile* is in the core."""
     return profile._native
-
-
-def standard_means(code: int) -> Decision:
-    """Whether an exception is a decision by the Modbus specification: see `Refused.means`."""
-    return _native.exception_means(code)
 
 
 @functools.cache
