@@ -141,6 +141,8 @@ impl Apart {
     /// behind it.
     fn by_harm(&self, others: &[&Arc<Family>], command: Command) -> Option<Verdict> {
         let named = &self.named;
+        // Where there is no word of it, that it harms nobody says nothing.
+        named.command(command)?;
         let is_harmed = |family: &&Arc<Family>| family.is_harmed_by(What::Command(command), named);
         let can_tell = others.iter().copied().filter(|family| !family.telling().is_empty());
         let mut in_danger: Vec<_> = can_tell.filter(is_harmed).collect();

@@ -79,6 +79,14 @@ fn trust_decides_where_nothing_is_shown() {
     assert!(matches!(verdict, Some(Verdict::Take(family)) if family.name() == "vfd500"));
 }
 
+/// A VFD500 has no word that ends a jog: that such a word harms nobody is no reason to take a unit for one.
+#[test]
+fn a_command_that_there_is_no_word_of_proves_nothing() {
+    let mut apart = Apart::new(&shipped("vfd500"), Families::shipped(), false);
+    apart.heard(Answer::refusal_of(0x1234, 0x02));
+    assert!(matches!(apart.verdict(What::Command(Command::JogStop)), Verdict::Ask(_)));
+}
+
 #[test]
 fn a_unit_that_is_busy_says_nothing_of_what_it_is() {
     let mut apart = Apart::new(&shipped("gd350"), Families::shipped(), false);
