@@ -79,6 +79,27 @@ fn trust_decides_where_nothing_is_shown() {
     assert!(matches!(verdict, Some(Verdict::Take(family)) if family.name() == "vfd500"));
 }
 
+/// GD35 manual: 0108H. A GD350 has 01A0H there, and others have no code at all.
+#[test]
+fn a_code_of_another_family_speaks_against_the_name() {
+    let mut apart = Apart::new(&shipped("gd350"), Families::shipped(), false);
+    apart.heard(Answer::word_at(0x2103, 0x0108));
+    assert!(apart.is_live(&shipped("gd35")));
+    assert!(!apart.is_live(&shipped("gd350")));
+    assert!(!apart.is_live(&shipped("gd300")));
+}
+
+/// MS300 manual: its output frequency is at 2103H, and may be just that word. 0005H at 2000H is none of its halts.
+#[test]
+fn a_code_that_a_rival_may_have_as_a_value_is_not_enough() {
+    let mut apart = Apart::new(&shipped("gd350"), Families::shipped(), false);
+    apart.heard(Answer::word_at(0x2103, 0x01A0));
+    assert!(apart.shows_named());
+    let Verdict::Ask(place) = apart.verdict(STOP) else { panic!("a rival was not asked for") };
+    apart.heard(Answer::refusal_of(place, 0x02));
+    assert!(!matches!(apart.verdict(STOP), Verdict::Take(family) if family.name() == "gd350"));
+}
+
 /// A VFD500 has no word that ends a jog: that such a word harms nobody is no reason to take a unit for one.
 #[test]
 fn a_command_that_there_is_no_word_of_proves_nothing() {
