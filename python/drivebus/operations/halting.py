@@ -30,8 +30,8 @@ _ASKED_FOR = 1.0
 
 
 _TO_SAY = 2.0
-"""Seconds of the line's clock in which a unit says what it is, on a line that was just opened and loses an answer: there
-one question alone takes a second."""
+"""Seconds of the line's clock in which a unit says what it is, on a line that was just opened and loses an answer. One
+question alone takes a second there."""
 
 
 class Halt:
@@ -68,7 +68,7 @@ class Halt:
 
     @property
     def is_over(self) -> bool:
-        """Whether its time has passed: of a unit that speaks, but did not say yet what it is, no less than it takes to."""
+        """Whether its time has passed. A unit that speaks, and did not say yet what it is, is given the time to."""
         now = self.unit.bus.now()
         is_asked = self._heard is not None and not self._told and not self.unit.bus.closed
         return now >= (max(self._until, self._began + _TO_SAY) if is_asked else self._until)
