@@ -66,7 +66,7 @@ impl Doubts {
             }
         }
         // What took the place of another, and that other, are both listed; of the two one is open.
-        let most = 1 + self.owed(unit).max(1);
+        let most = self.owed(unit).max(1).saturating_add(1);
         let (words, refusal) = (words.min(most), refusal.min(most));
         match self.rivals_end(now, unit, expected) {
             None => Attribution::Certain,

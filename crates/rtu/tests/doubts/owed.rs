@@ -92,6 +92,14 @@ fn pdu(frame: &Adu) -> &[u8] {
     &bytes[1..bytes.len() - 2]
 }
 
+/// A cable that was out for minutes.
+#[test]
+fn more_is_left_open_than_is_counted() {
+    let asker = owing(300);
+    assert!(matches!(asker.attribution(ms(1_600), &read(2)), Attribution::Wait(_)));
+    assert_eq!(asker.attribution(ms(1_600), &read(1)), repeat(1, u8::MAX));
+}
+
 /// A unit on a line where answers overtake each other: what it was asked and has not answered.
 struct Owing {
     asker: Asker,

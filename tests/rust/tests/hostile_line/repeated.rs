@@ -243,7 +243,7 @@ fn longer_reads_that_came_damaged_are_asked_for_again() {
 /// What was refused as its caller put it says nothing of longer forms: a unit may be busy for a moment.
 #[test]
 fn a_read_that_can_be_told_apart_as_it_is_may_be_refused_and_put_so_again() {
-    let rig = without_echo(|number, request| if number < 4 { at_once(&refusal(3)) } else { at_once(&right(request)) });
+    let rig = without_echo(|number, request| if number < 3 { at_once(&refusal(3)) } else { at_once(&right(request)) });
     let error = rig.read(200, 2).unwrap_err();
     assert!(matches!(error.failure, Failure::Refused { .. }), "{error}");
     pass_long(&rig);
