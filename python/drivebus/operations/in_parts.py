@@ -39,9 +39,9 @@ def counted(unit: DriveView) -> Iterator[DriveView]:
     if unit.taken is not None:
         yield unit
         return
-    view = replace(unit, taken=Taken())
+    taken = Taken()
     try:
-        yield view
+        yield replace(unit, taken=taken)
     except DrivebusError as error:
-        error.in_part = view.taken is not None and view.taken.writes > 0
+        error.in_part = taken.writes > 0
         raise

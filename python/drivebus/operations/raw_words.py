@@ -131,6 +131,7 @@ async def send(
     value = as_written(unit.profile, value)
     table, first = tables.split(address)
     shown_at = None if read_back is None else tables.split(read_back)[1]
+    is_confirmed = True
     try:
         with explained(unit):
             await unit.bus.ask(
@@ -140,15 +141,10 @@ async def send(
         # Where the words can be read, the bus has looked whether they are there.
         if error.means != "taken":
             raise
-        _count(unit)
-        return False
-    _count(unit)
-    return True
-
-
-def _count(unit: DriveView) -> None:
+        is_confirmed = False
     if unit.taken is not None:
         unit.taken.writes += 1
+    return is_confirmed
 
 
 @contextmanager
