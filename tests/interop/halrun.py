@@ -134,7 +134,8 @@ class Session:
         """Leaves nothing behind, whatever became of the test."""
         for name in ("drivebus", "other"):
             if process := self.process(name):
-                os.kill(process, 9)
+                with suppress(ProcessLookupError):  # HAL shows a program for a moment after its end
+                    os.kill(process, 9)
         self.end()
         subprocess.run(["halrun", "-U"], env=self._linuxcnc.env, capture_output=True, timeout=30)
         self._output.close()
