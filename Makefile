@@ -1,10 +1,11 @@
 # Every command of this project. People and CI run the same lines.
-# All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .venv-docs/, .venv-fuzz/, .venv-release/, .venv-wheels/, .tools/, target/ and dist/.
+# All that is set up stays in .venv/, .venv-conformance/, .venv-bench/, .venv-docs/, .venv-fuzz/, .venv-scada/, .venv-release/, .venv-wheels/, .tools/, target/ and dist/.
 
 PYTHON ?= python3
 TEST_JOBS ?= 4
 PYTEST_JOBS ?= 5
 VENV   := .venv
+SCADA  := .venv-scada
 # What an environment calls the folder of its programs.
 BINS   := $(if $(filter Windows_NT,$(OS)),Scripts,bin)
 BIN    := $(VENV)/$(BINS)
@@ -67,7 +68,7 @@ demo: $(VENV)/.wheel
 # and can wait is done beside them, and gives way to them.
 AT_ONCE := $(MAKE) --no-print-directory --jobs=3
 test:
-	@$(AT_ONCE) rust-lint dist/.wheel $(VENV)/.dev interop-parts
+	@$(AT_ONCE) rust-lint dist/.wheel $(VENV)/.dev $(SCADA)/.installed interop-parts
 	@$(AT_ONCE) python-test beside-tests
 	@$(MAKE) --no-print-directory rust-test examples wheel-smoke
 	@echo "make test: every check passed"
@@ -157,6 +158,13 @@ schema: $(VENV)/.created ## changes a file
 interop-parts:
 	@sh tools/debian_parts.sh
 
+# It needs older parts than drivebus is tested with.
+$(SCADA)/.installed: pyproject.toml
+	$(PYTHON) -m venv --clear $(SCADA)
+	$(SCADA)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(SCADA)/bin/python -m pip install --quiet --group scada
+	@touch $@
+
 # What pytest makes of each file takes longer than to import it; it is made once here, and not by each of those who run tests.
 PYTEST := env PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -p no:benchmark
 
@@ -165,7 +173,7 @@ python-collect: $(VENV)/.dev $(VENV)/.wheel
 
 # Most of these tests wait for a line and not for a core, so five files at a time take half as long as two. A file stays together:
 # its tests share what it set up. Benchmarks are none of them, and their plug-in cannot stand company.
-python-test: python-collect interop-parts
+python-test: python-collect $(SCADA)/.installed interop-parts
 	$(PYTEST) -n $(PYTEST_JOBS) --dist loadfile --no-loadscope-reorder
 
 examples: $(VENV)/.wheel
