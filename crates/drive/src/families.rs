@@ -1,8 +1,9 @@
 //! Families: all that a unit may be of.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
-use drivebus_drives::Profile;
+use drivebus_drives::{Place, Profile};
 
 use crate::codes::Codes;
 use crate::family::Family;
@@ -12,6 +13,8 @@ use crate::family::Family;
 pub struct Families {
     known: Vec<Arc<Family>>,
     codes: Arc<Codes>,
+    /// Where units take commands, and of which families.
+    commanded: BTreeMap<Place, Vec<Arc<Family>>>,
 }
 
 impl Families {
@@ -28,8 +31,14 @@ impl Families {
     pub fn of(profiles: impl IntoIterator<Item = Arc<Profile>>) -> Self {
         let profiles: Vec<_> = profiles.into_iter().collect();
         let codes = Arc::new(Codes::of(&profiles));
-        let known = profiles.iter().map(|profile| Arc::new(family(profile, &profiles, &codes))).collect();
-        Self { known, codes }
+        let known: Vec<_> = profiles.iter().map(|profile| Arc::new(family(profile, &profiles, &codes))).collect();
+        let mut commanded: BTreeMap<Place, Vec<Arc<Family>>> = BTreeMap::new();
+        for family in &known {
+            for &place in family.command_registers().keys() {
+                commanded.entry(place).or_default().push(Arc::clone(family));
+            }
+        }
+        Self { known, codes, commanded }
     }
 
     /// The family that `profile` describes: one of these, or one of somebody's own.
@@ -51,6 +60,11 @@ impl Families {
     /// Each of them.
     pub fn iter(&self) -> impl Iterator<Item = &Arc<Family>> {
         self.known.iter()
+    }
+
+    /// Those whose units take commands at `place`, in their order; none where none of them does.
+    pub fn commanded_at(&self, place: Place) -> &[Arc<Family>] {
+        self.commanded.get(&place).map_or(&[], Vec::as_slice)
     }
 
     /// The codes that they list.

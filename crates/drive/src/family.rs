@@ -1,6 +1,6 @@
 //! A family, as a unit is told to be of it or not: its profile, and what is worked out of that once.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use drivebus_drives::{Access, Command, Entry, Identification, Place, Profile, Signature, State, Table};
@@ -31,7 +31,8 @@ pub struct Family {
     answered: BTreeSet<Place>,
     refused: BTreeSet<Place>,
     telling: Vec<Place>,
-    command_registers: BTreeSet<Place>,
+    /// Where its units take commands, and what each word means there.
+    command_registers: BTreeMap<Place, BTreeMap<u16, String>>,
     halts: BTreeSet<(Place, u16)>,
     groups: BTreeSet<u8>,
 }
@@ -75,7 +76,7 @@ impl Family {
             answered,
             refused: refuses.iter().copied().collect(),
             telling,
-            command_registers: profile.command_registers().into_keys().collect(),
+            command_registers: command_registers(&profile),
             halts: HALTS.into_iter().filter_map(|command| profile.command(command)).collect(),
             groups: profile.parameter_groups().collect(),
             signature,
@@ -194,7 +195,12 @@ impl Family {
 
     /// Whether its units take commands at `place`.
     pub(crate) fn commands_at(&self, place: Place) -> bool {
-        self.command_registers.contains(&place) || self.profile.is_command(place)
+        self.command_registers.contains_key(&place) || self.profile.is_command(place)
+    }
+
+    /// The registers that take commands, with the words that the family defines there and what they mean.
+    pub(crate) fn command_registers(&self) -> &BTreeMap<Place, BTreeMap<u16, String>> {
+        &self.command_registers
     }
 
     /// Whether `place` is where its units may have a parameter, by the rule of their addresses.
@@ -207,4 +213,9 @@ impl Family {
     pub(crate) fn command(&self, command: Command) -> Option<(Place, u16)> {
         self.profile.command(command)
     }
+}
+
+fn command_registers(profile: &Profile) -> BTreeMap<Place, BTreeMap<u16, String>> {
+    let owned = |codes: BTreeMap<u16, &str>| codes.into_iter().map(|(code, name)| (code, name.to_owned())).collect();
+    profile.command_registers().into_iter().map(|(place, codes)| (place, owned(codes))).collect()
 }

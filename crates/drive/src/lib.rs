@@ -27,6 +27,7 @@
 //!
 //! Units are named by people, and people mistake one drive for another: the word that stops one family starts another.
 //! [`Families`] knows whom a word would harm, and [`Apart`] which few words to ask a unit for before it is sent.
+//! [`Families::check`] holds what is written by its address against the registers that take commands.
 //!
 //! # Rooms
 //!
@@ -37,6 +38,7 @@
 //! | `codes` | identification codes: where they stand, and what is listed of each |
 //! | `family`, `families` | a family by what its units answer and refuse; all that a unit may be of |
 //! | `harm` | what a word that is meant for one family does to another |
+//! | `guard` | what words that are written by their address would command |
 //! | `contradiction` | what speaks against a family |
 //! | `apart` | which family a unit may be, and what to ask it next |
 
@@ -48,6 +50,7 @@ mod codes;
 mod contradiction;
 mod families;
 mod family;
+mod guard;
 mod harm;
 mod rule;
 
@@ -57,6 +60,7 @@ pub use codes::Codes;
 pub use contradiction::Contradiction;
 pub use families::Families;
 pub use family::{Family, HALTS};
+pub use guard::Forbidden;
 pub use harm::What;
 pub use rule::{Rule, WhyNot};
 
