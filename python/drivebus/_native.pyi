@@ -6,7 +6,7 @@ Errors are those of `drivebus.errors`; `NotAllowed` always means that nothing wa
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Final, Generic, TypeAlias, TypeVar, final
+from typing import Any, Final, Generic, Literal, TypeAlias, TypeVar, final
 
 from typing_extensions import Buffer
 
@@ -42,6 +42,7 @@ __all__ = [
     "check_port_options",
     "code_places",
     "code_rows",
+    "commanded_at",
     "crc16",
     "decode",
     "decode_answer",
@@ -51,6 +52,7 @@ __all__ = [
     "end_of_program",
     "exception_means",
     "fault_kinds",
+    "forbidden",
     "frame_len",
     "frames_in",
     "is_write",
@@ -577,6 +579,20 @@ def listed_codes() -> list[int]:
 
 def passes(answer: _Answer, /) -> bool:
     """Whether *answer* is a refusal that passes, whatever the unit is."""
+
+_Undefined: TypeAlias = tuple[Literal["undefined"], str, int, int, dict[int, str]]
+_Foreign: TypeAlias = tuple[Literal["foreign"], str, int, int | None, list[str]]
+
+def forbidden(families: Sequence[Family], place: int, words: int | Sequence[int], /) -> _Undefined | _Foreign | None:
+    """Why *words* (each 0..=0xFFFF) may not be written from *place* on to a unit that may be one of *families*, if so.
+
+    `undefined`: the title of the first of them that has commands there, the place, the word, and its codes by name.
+    `foreign`: the title of the first of them, the place, where it takes its commands, and the titles of the families
+    that take theirs there. NotAllowed: there is no such place or word.
+    """
+
+def commanded_at(place: int, /) -> list[str]:
+    """The titles of the shipped families that take commands at *place*. NotAllowed: there is no such place."""
 
 @final
 class Profile:

@@ -39,6 +39,13 @@ type Against<'py> = (&'static str, u32, u16, Vec<Bound<'py, PyDict>>);
 #[derive(Debug)]
 pub(crate) struct Family(Arc<drive::Family>);
 
+impl Family {
+    /// What it is in the core.
+    pub(crate) fn core(&self) -> Arc<drive::Family> {
+        Arc::clone(&self.0)
+    }
+}
+
 #[pymethods]
 impl Family {
     #[new]

@@ -16,6 +16,7 @@ mod errors;
 mod format;
 mod frames;
 mod gateway;
+mod guard;
 mod mailbox;
 mod open;
 mod overhear;
@@ -54,6 +55,8 @@ mod _native {
     };
     #[pymodule_export]
     use crate::gateway::Gateway;
+    #[pymodule_export]
+    use crate::guard::{commanded_at, forbidden};
     #[pymodule_export]
     use crate::mailbox::Mailbox;
     #[pymodule_export]
