@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from drivebus import _native
-from drivebus.identify.family import family_of
 from drivebus.identify.refusals import Answer
 from drivebus.profile import Profile
+from drivebus.profile.family import family_of
 
 __all__ = ["Apart", "Verdict"]
 

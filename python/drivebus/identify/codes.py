@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from drivebus import _native
-from drivebus.identify.family import family_of
 from drivebus.profile import Profile
 from drivebus.profile.facts import IdentificationCode
+from drivebus.profile.family import family_of
 
 __all__ = ["address_of", "all_listed", "families_in", "is_listed", "is_own", "listed_at", "registers", "rows_of"]
 

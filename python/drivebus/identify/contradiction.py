@@ -14,10 +14,10 @@ from drivebus import tables
 from drivebus.advice import Advice, Text, argument
 from drivebus.identify import codes
 from drivebus.identify.families import asked_as, one_of, shipped
-from drivebus.identify.family import family_of
 from drivebus.identify.refusals import Answer
 from drivebus.profile import Profile, profiles
 from drivebus.profile.facts import IdentificationCode
+from drivebus.profile.family import family_of
 
 __all__ = ["contradiction", "is_suspicious", "other_signature"]
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import functools
 
 from drivebus._native import HALTS
-from drivebus.identify.family import family_of
 from drivebus.profile import Profile
+from drivebus.profile.family import family_of
 
 __all__ = ["HALTS", "halt_of", "harmed", "harms"]
 

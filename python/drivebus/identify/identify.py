@@ -11,12 +11,12 @@ from drivebus import tables
 from drivebus.errors import BadAnswer, NoAnswer
 from drivebus.identify import codes, signatures
 from drivebus.identify.families import all_of, one_of, shipped
-from drivebus.identify.family import family_of
 from drivebus.identify.refusals import LOCKED, UNREACHED, answer_at
 from drivebus.identify.results import Certainty, Identification
 from drivebus.line.asking import Ask
 from drivebus.profile import Profile
 from drivebus.profile.facts import IdentificationCode
+from drivebus.profile.family import family_of
 
 __all__ = ["identify"]
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 from drivebus import _native, tables
 from drivebus.errors import BadAnswer, Refused
-from drivebus.identify.family import family_of
 from drivebus.line.asking import Ask, Read
 from drivebus.profile import Profile
+from drivebus.profile.family import family_of
 
 __all__ = [
     "LOCKED",

@@ -6,10 +6,10 @@ import functools
 from collections.abc import Sequence
 
 from drivebus.errors import BadAnswer, NoAnswer
-from drivebus.identify.family import family_of
 from drivebus.identify.refusals import Answer, answer_at, passes
 from drivebus.line.asking import Ask
 from drivebus.profile import Profile, profiles
+from drivebus.profile.family import family_of
 
 __all__ = ["Signature", "listed", "shown_by", "shows", "signature_of"]
 

@@ -122,7 +122,7 @@ class Units:
         record.profiles[profile.name] = profile
         if unverified:
             record.trusted.add(profile.name)
-        prepare_guard()  # now, so that no stop has to wait for it
+        prepare_guard(profile)  # now, so that no stop has to wait for it
 
     def named(self) -> list[UnitRecord]:
         """The records of the units that a drive was asked for."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 
 from drivebus import _native
-from drivebus.profile import Profile, native_of
+from drivebus.profile.profile import Profile, native_of
 
 __all__ = ["family_of"]
 
