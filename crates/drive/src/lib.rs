@@ -29,6 +29,9 @@
 //! [`Families`] knows whom a word would harm, and [`Apart`] which few words to ask a unit for before it is sent.
 //! [`Families::check`] holds what is written by its address against the registers that take commands.
 //!
+//! A drive that was told to stop says "running" until its motor stands. [`Fall`] takes what is seen of that meanwhile, and
+//! knows whether it proves that the motor obeys.
+//!
 //! # Rooms
 //!
 //! | room | what is in it |
@@ -41,6 +44,7 @@
 //! | `guard` | what words that are written by their address would command |
 //! | `contradiction` | what speaks against a family |
 //! | `apart` | which family a unit may be, and what to ask it next |
+//! | `fall` | what is seen of a motor that was told to stop, and whether it proves that it obeys |
 
 #![forbid(unsafe_code)]
 
@@ -48,6 +52,7 @@ mod answer;
 mod apart;
 mod codes;
 mod contradiction;
+mod fall;
 mod families;
 mod family;
 mod guard;
@@ -58,6 +63,7 @@ pub use answer::{Answer, Said, meanings};
 pub use apart::{Apart, Verdict};
 pub use codes::Codes;
 pub use contradiction::Contradiction;
+pub use fall::{Fall, Look};
 pub use families::Families;
 pub use family::{Family, HALTS};
 pub use guard::Forbidden;
