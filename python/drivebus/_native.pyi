@@ -24,6 +24,7 @@ __all__ = [
     "Asked",
     "Batch",
     "Bus",
+    "Fall",
     "Family",
     "Gateway",
     "Mailbox",
@@ -593,6 +594,44 @@ def forbidden(families: Sequence[Family], place: int, words: int | Sequence[int]
 
 def commanded_at(place: int, /) -> list[str]:
     """The titles of the shipped families that take commands at *place*. NotAllowed: there is no such place."""
+
+@final
+class Fall:
+    """What was seen of a motor since a stop was sent, and whether that proves that it obeys.
+
+    Moments are seconds of the line's clock, to a nanosecond; what lies before or behind it is its begin or its end.
+    """
+
+    PATIENCE: Final[float]
+    """Seconds of the line's clock in which the frequency of a motor that stops must fall: even a ramp of an hour takes
+    off a hundredth of a hertz in that time."""
+
+    def __new__(cls, sent: float, confirmed: float, within: float, /) -> Fall:
+        """Nothing was seen yet: the stop goes out at *sent* or later, and the drive had confirmed it at *confirmed*.
+
+        For *within* seconds behind that it is looked at in any case.
+        """
+    @property
+    def until(self) -> float:
+        """Until when it is worth another look."""
+    @property
+    def frequency(self) -> float | None:
+        """The one seen last, in Hz; None if none was."""
+    @property
+    def seen_at(self) -> float:
+        """When that was; *confirmed* if none was."""
+    def wait(self, seconds: float, /) -> None:
+        """For *seconds* nobody looked, because something else was asked: they do not count."""
+    def goes_on(self) -> None:
+        """It is not at rest."""
+    def rests(self, now: float, /) -> bool:
+        """It is at rest. Whether that is its standstill, and no passage through zero."""
+    def see(self, hz: float, setpoint: float, asked: float, answered: float, /) -> None:
+        """Takes the frequency and the setpoint in force of one look into account, both in Hz; inf is an unknown one."""
+    def is_worth_asking(self) -> bool:
+        """Whether so much of it was seen that it is worth asking the drive for its ramp."""
+    def goes_along(self, slope: float, /) -> bool:
+        """Whether enough was seen, and all of it where a ramp of *slope* Hz/s goes that began with the stop."""
 
 @final
 class Profile:

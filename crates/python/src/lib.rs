@@ -13,6 +13,7 @@ mod clock;
 mod convert;
 mod ending;
 mod errors;
+mod fall;
 mod format;
 mod frames;
 mod gateway;
@@ -46,6 +47,8 @@ mod _native {
     use crate::bus::Bus;
     #[pymodule_export]
     use crate::ending::{begin_of_child, end_of_program};
+    #[pymodule_export]
+    use crate::fall::Fall;
     #[pymodule_export]
     use crate::format::SerialFormat;
     #[pymodule_export]
