@@ -199,7 +199,7 @@ class Proof:
         """For *seconds* others were looked at: they do not count."""
         self._deadline += seconds
         if self._fall is not None:
-            self._fall.until += seconds
+            self._fall.wait(seconds)
 
     @property
     def pause(self) -> float:

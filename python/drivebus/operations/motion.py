@@ -344,7 +344,7 @@ def _proof_of_halt(unit: DriveView, command: str, sent: float, confirmed: float,
         if ramp is None and fall.is_worth_asking():
             ramp = await speed.ramp(unit, urgent=True)
             # One that is slow to say nothing of it has still been falling meanwhile.
-            fall.until += unit.bus.now() - fall.seen_at
+            fall.wait(unit.bus.now() - fall.seen_at)
         if ramp is None or ramp.slope is None:
             return False
         return fall.goes_along(ramp.slope) and ramp.only_by_bus and by_ramp
