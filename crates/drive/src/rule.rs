@@ -1,6 +1,6 @@
 //! The rule: one profile, and how far it is trusted.
 
-use drivebus_drives::{Access, Command, Entry, Evidence, Profile};
+use drivebus_drives::{Access, BitField, Command, Entry, Evidence, Kind, Profile, Store, Variant};
 
 /// What may be asked of units of one family.
 #[derive(Debug, Clone, Copy)]
@@ -97,6 +97,42 @@ impl<'p> Rule<'p> {
         }
     }
 
+    /// Whether the bits of `field` in a word of `entry` may be set.
+    ///
+    /// # Errors
+    ///
+    /// [`WhyNot::NotPrinted`]: where they are.
+    pub fn bits(&self, entry: &'p Entry, field: &BitField) -> Result<(), WhyNot<'p>> {
+        self.proves(field.verified(), entry.note())
+    }
+
+    /// Whether `entry` may be written to where `store` keeps it. Whether there is an
+    /// [address](Profile::write_address) for that is not asked here.
+    ///
+    /// Only the address of a parameter says where it is kept. Its plain one does not when it is to be kept for good: it is
+    /// what anybody writes to who knows of no such rule.
+    ///
+    /// # Errors
+    ///
+    /// [`WhyNot::NotPrinted`]: how the family keeps parameters.
+    pub fn kept(&self, entry: &Entry, store: Store) -> Result<(), WhyNot<'p>> {
+        let Some(memory) = self.profile.memory() else { return Ok(()) };
+        let is_plain = || self.profile.write_address(entry, store).ok() == entry.place();
+        if entry.kind() != Kind::Parameter || store == Store::Eeprom && is_plain() {
+            return Ok(());
+        }
+        self.proves(memory.verified, &memory.note)
+    }
+
+    /// Whether what a parameter of the drive says of `variant` may be used.
+    ///
+    /// # Errors
+    ///
+    /// [`WhyNot::NotPrinted`]: what its words mean.
+    pub fn variant(&self, variant: &'p Variant) -> Result<(), WhyNot<'p>> {
+        self.proves(variant.verified, &variant.note)
+    }
+
     /// Whether `command` may be given.
     ///
     /// # Errors
@@ -180,6 +216,42 @@ mod tests {
                 assert!(printed.command(command).is_err() || known);
             }
         }
+    }
+
+    /// GD350 manual, section 9.4.4: with bit 15 an address is kept in RAM only. No page at hand has that of a GD10, of which
+    /// the plain address is as good as with any drive.
+    #[test]
+    fn where_a_parameter_is_kept_has_to_be_printed() {
+        for (name, printed) in [("gd350", true), ("gd10", false), ("gd600", true)] {
+            let profile = builtin(name);
+            let source = profile.find("P00.01").unwrap();
+            let rule = Rule::printed(&profile);
+            assert_eq!(rule.kept(source, Store::Eeprom), Ok(()), "{name}");
+            assert_eq!(rule.kept(source, Store::Ram).is_ok(), printed, "{name}");
+            assert_eq!(Rule::trusting(&profile).kept(source, Store::Ram), Ok(()));
+            // A register is kept nowhere.
+            let setpoint = profile.role("setpoints.frequency").unwrap();
+            assert_eq!(rule.kept(setpoint, Store::Ram), Ok(()), "{name}");
+        }
+    }
+
+    /// VFD500: by which words of P30.14 a speed is in rpm, no page at hand says; V20: nor where some bits of its control
+    /// word are.
+    #[test]
+    fn what_decides_and_what_is_set_has_to_be_printed() {
+        let vfd500 = builtin("vfd500");
+        let unit = &vfd500.variants()["speed_unit"];
+        assert_eq!(Rule::printed(&vfd500).variant(unit), Err(WhyNot::NotPrinted(&unit.note)));
+        assert_eq!(Rule::trusting(&vfd500).variant(unit), Ok(()));
+
+        let v20 = builtin("v20");
+        let word = v20.find("control_command").unwrap();
+        let may = |rule: Rule<'_>, name: &str| {
+            rule.bits(word, word.bits().iter().find(|field| field.name() == name).unwrap()).is_ok()
+        };
+        assert!(!may(Rule::printed(&v20), "jog_right"));
+        assert!(may(Rule::printed(&v20), "on"));
+        assert!(may(Rule::trusting(&v20), "jog_right"));
     }
 
     #[test]
