@@ -508,6 +508,12 @@ class Rule:
         """NotAllowed: there is no such name."""
     def word(self, name: str, word: int, /) -> tuple[str, str] | None:
         """NotAllowed: there is no such name."""
+    def bits(self, name: str, field: str, /) -> tuple[str, str] | None:
+        """Of the bits *field* in the word *name*. NotAllowed: there is no such name, or it has no such bits."""
+    def kept(self, name: str, store: bool, /) -> tuple[str, str] | None:
+        """Of *name*, written to be kept for good, or else in RAM alone. NotAllowed: there is no such name."""
+    def variant(self, name: str, /) -> tuple[str, str] | None:
+        """NotAllowed: there is no such variant."""
     def command(self, name: str, /) -> tuple[str, str] | None: ...
     def state(self) -> tuple[str, str] | None: ...
     def fault(self) -> tuple[str, str] | None: ...

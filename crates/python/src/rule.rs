@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use drivebus_drive::{Rule as Core, WhyNot};
-use drivebus_drives as drives;
+use drivebus_drives::{self as drives, Store};
 use pyo3::prelude::*;
 
+use crate::errors::bad_argument;
 use crate::profile::{Profile, entry_of};
 
 /// What may be asked of units of one family, under one trust.
@@ -46,6 +47,27 @@ impl Rule {
     #[pyo3(signature = (name, word, /))]
     fn word(&self, name: &Bound<'_, PyAny>, word: u32) -> PyResult<Told> {
         Ok(told(self.core().word(&*entry_of(&self.profile, name)?, word)))
+    }
+
+    #[pyo3(signature = (name, field, /))]
+    fn bits(&self, name: &Bound<'_, PyAny>, field: &str) -> PyResult<Told> {
+        let entry = entry_of(&self.profile, name)?;
+        let known = entry.bits().iter().find(|known| known.name() == field);
+        let known = known.ok_or_else(|| bad_argument(format!("{} has no bits {field}", entry.name())))?;
+        Ok(told(self.core().bits(&entry, known)))
+    }
+
+    #[pyo3(signature = (name, store, /))]
+    fn kept(&self, name: &Bound<'_, PyAny>, store: bool) -> PyResult<Told> {
+        let store = if store { Store::Eeprom } else { Store::Ram };
+        Ok(told(self.core().kept(&*entry_of(&self.profile, name)?, store)))
+    }
+
+    #[pyo3(signature = (name, /))]
+    fn variant(&self, name: &str) -> PyResult<Told> {
+        let known = self.profile.variants().get(name);
+        let known = known.ok_or_else(|| bad_argument(format!("{} has no variant {name}", self.profile.name())))?;
+        Ok(told(self.core().variant(known)))
     }
 
     /// A name that is no command of any family is one that this family does not have.
