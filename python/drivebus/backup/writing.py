@@ -51,13 +51,11 @@ def place(unit: DriveView, code: str, *, store: bool) -> int:
     Raises:
         NotAllowed: How the family does that is not known, or not verified.
     """
-    profile = unit.profile
-    memory = profile.memory()
-    address = profile.address(code, store=store)
-    plain = store and address == profile.describe(code).place
-    if memory is None or unit.evidence.allows(memory.reason) or plain:
+    address = unit.profile.address(code, store=store)
+    reason = unit.evidence.unkept(code, store=store)
+    if reason is None:
         return address
-    raise Unverified(f"how {profile.title} keeps a parameter is not verified: {memory.reason}")
+    raise Unverified(f"how {unit.profile.title} keeps a parameter is not verified: {reason}")
 
 
 async def _look(unit: DriveView, code: str) -> int:

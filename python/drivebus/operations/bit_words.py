@@ -113,8 +113,7 @@ async def _set_bits(unit: DriveView, setpoint: str, given: Mapping[str, object],
         for name, value in given.items()
     ]
     for name in given:
-        if name in known.unverified_bits:
-            unit.evidence.rule(f"where {name} is in {register} of {unit.profile.title}", known.note)
+        unit.evidence.require_bits(register, name)
     moves = unit.profile.is_command(unit.profile.address(register))
     if moves:
         start_checks.can_be_stopped(unit)

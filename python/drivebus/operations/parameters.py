@@ -205,11 +205,7 @@ def plan_write(unit: DriveView, name: str, value: object, store: bool) -> Planne
     raw = unit.profile.encode(name, value)
     unit.evidence.require_writable_word(name, raw)
     address = unit.profile.address(name, store=store)
-    if known.kind == "parameter" and (address != known.place or not store):
-        memory = unit.profile.memory()
-        kept = "EEPROM" if store else "RAM"
-        reason = None if memory is None else memory.reason
-        unit.evidence.rule(f"how {unit.profile.title} keeps a parameter in {kept}", reason)
+    unit.evidence.require_kept(name, store=store)
     return Planned(known, name, address, raw)
 
 

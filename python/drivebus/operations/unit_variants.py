@@ -52,10 +52,11 @@ async def _chosen(unit: DriveView, variant: str) -> str:
     rule = rules(unit)[variant]
     parameter, choices = rule.parameter, rule.choices
     says = Text(given(unit, variant), " says which")
-    if rule.reason is not None and not unit.evidence.allows(rule.reason):
+    reason = unit.evidence.undecided(variant)
+    if reason is not None:
         raise not_verified(
             f"what {parameter} decides in {unit.profile.title}, and so what the word means (its {variant})",
-            Text(f"{rule.reason.rstrip('.')}; ", says),
+            Text(f"{reason.rstrip('.')}; ", says),
             unit.address,
         )
     unit.evidence.require_readable([parameter])

@@ -114,6 +114,27 @@ class Evidence:
         if self._rule.word(name, word) is not None:
             raise not_verified(f"writing {word} to {self._named(name)}", _NO_RANGE, self.unit)
 
+    def require_bits(self, name: str, field: str) -> None:
+        """Raises `NotAllowed` if where *field* is in the word *name* is not printed."""
+        reason = self._worded(self._rule.bits(name, field))
+        if reason is not None:
+            raise not_verified(f"where {field} is in {name} of {self.profile.title}", reason, self.unit)
+
+    def require_kept(self, name: str, *, store: bool) -> None:
+        """Raises `NotAllowed` if how *name* is written for good, or else to RAM alone, is not printed."""
+        reason = self.unkept(name, store=store)
+        if reason is not None:
+            kept = "EEPROM" if store else "RAM"
+            raise not_verified(f"how {self.profile.title} keeps a parameter in {kept}", reason, self.unit)
+
+    def unkept(self, name: str, *, store: bool) -> str | None:
+        """Why *name* may not be written for good, or else to RAM alone; None if it may, where its address is known."""
+        return self._worded(self._rule.kept(name, store))
+
+    def undecided(self, variant: str) -> str | None:
+        """Why what the parameter of *variant* says may not be used; None if it may."""
+        return self._worded(self._rule.variant(variant))
+
     def require_command(self, name: str) -> None:
         """Raises `NotAllowed` if the family has no command *name*, or it may not be given."""
         why = self._rule.command(name)
@@ -141,15 +162,6 @@ class Evidence:
         hint = Text("; ", _UNVERIFIED, " uses what is assumed") if helps else ""
         told = Text(f"{what}: ", _sentence(reason), f" Nothing was sent to unit {self.unit}", hint)
         return Unverified(told, unit=self.unit)
-
-    def allows(self, reason: str | None) -> bool:
-        """Whether what has a *reason* not to be used may be used all the same; with None there is no such reason."""
-        return reason is None or self.unverified
-
-    def rule(self, what: str, reason: str | None) -> None:
-        """Raises `NotAllowed` if *what* has a *reason* not to be used, and nobody said that it may be all the same."""
-        if not self.allows(reason):
-            raise not_verified(what, reason, self.unit)
 
     def _worded(self, why: tuple[str, str] | None, what: str = "") -> str | None:
         """A reason of the core in words; None where there is none."""
