@@ -45,6 +45,7 @@
 //! | `contradiction` | what speaks against a family |
 //! | `apart` | which family a unit may be, and what to ask it next |
 //! | `fall` | what is seen of a motor that was told to stop, and whether it proves that it obeys |
+//! | `task` | operations that wait for a line, and how they are driven without one |
 
 #![forbid(unsafe_code)]
 
@@ -58,6 +59,7 @@ mod family;
 mod guard;
 mod harm;
 mod rule;
+pub mod task;
 
 pub use answer::{Answer, Said, meanings};
 pub use apart::{Apart, Verdict};

@@ -1,0 +1,265 @@
+//! Operations that wait for a line, without one: each is an `async fn` over a [`Mailbox`], and a [`Task`] drives it by hand.
+//!
+//! An operation puts what it wants done into its mailbox, as a [`Wish`], and waits. Whoever drives it does that, and brings
+//! the [`Outcome`] to its next step. So an operation is written once, from its beginning to its end, and needs no clock, no
+//! port, no thread and no runtime: a thread that blocks drives it, and so do an event loop, another language and a test.
+
+mod line_error;
+mod wish;
+
+use std::fmt;
+use std::future::{Future, poll_fn};
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
+use std::time::Duration;
+
+use drivebus_rtu::Instant;
+use thiserror::Error;
+
+pub use line_error::{Cause, LineError};
+pub use wish::{Read, Wish};
+
+/// What is seen of the line before a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Seen {
+    /// Now, on the line's clock.
+    pub now: Instant,
+    /// How often its port was opened again after it was lost.
+    pub connection: u64,
+    /// Whether it was closed for good.
+    pub is_closed: bool,
+}
+
+/// What came of a wish. `E` is the error of whoever drives.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Outcome<E> {
+    /// The words that were read, as many as were asked for.
+    Words(Vec<u16>),
+    /// The time is over.
+    Slept,
+    /// It failed.
+    Failed(E),
+}
+
+/// What a step came to.
+#[derive(Debug)]
+pub enum Step<T> {
+    /// The operation wants this, and waits.
+    Wish(Wish),
+    /// It is done.
+    Done(T),
+}
+
+/// A step that could not be made. The task is as it was before, and may be given another one.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum Misuse {
+    /// An outcome came, and nothing was wished for.
+    #[error("an outcome came that nothing was wished for")]
+    NotWished,
+    /// Nothing came of the last wish.
+    #[error("the last wish has no outcome yet: {0}")]
+    NoOutcome(Wish),
+    /// What came is not what was wished for.
+    #[error("what came does not fit the last wish: {0}")]
+    Unfit(Wish),
+    /// Time went back.
+    #[error("the clock went back by {0:?}")]
+    WentBack(Duration),
+    /// The operation is done.
+    #[error("the operation is done")]
+    Over,
+    /// The operation waits for something that is no outcome of its mailbox.
+    #[error("the operation waits for something else than its mailbox")]
+    Stuck,
+}
+
+/// Where an operation puts what it wants done, and finds what came of it.
+pub struct Mailbox<E>(Arc<Mutex<Desk<E>>>);
+
+/// What lies between an operation and who drives it.
+struct Desk<E> {
+    seen: Seen,
+    wish: Option<Wish>,
+    outcome: Option<Outcome<E>>,
+}
+
+impl<E> Mailbox<E> {
+    /// Now, on the line's clock, as it was before this step.
+    pub fn now(&self) -> Instant {
+        self.desk().seen.now
+    }
+
+    /// How often the port was opened again: while this number stays the same, whoever answered still does.
+    pub fn connection(&self) -> u64 {
+        self.desk().seen.connection
+    }
+
+    /// Whether the line was closed for good.
+    pub fn is_closed(&self) -> bool {
+        self.desk().seen.is_closed
+    }
+
+    /// Reads words.
+    ///
+    /// # Errors
+    ///
+    /// What whoever drives made of it.
+    pub async fn read(&self, read: Read) -> Result<Vec<u16>, E> {
+        let words = |outcome| match outcome {
+            Outcome::Words(words) => Some(Ok(words)),
+            Outcome::Failed(error) => Some(Err(error)),
+            Outcome::Slept => None,
+        };
+        self.ask(Wish::Read(read), words).await
+    }
+
+    /// Waits on the line's clock; others may use the line meanwhile.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`](Self::read) has them.
+    pub async fn sleep(&self, time: Duration) -> Result<(), E> {
+        let slept = |outcome| match outcome {
+            Outcome::Slept => Some(Ok(())),
+            Outcome::Failed(error) => Some(Err(error)),
+            Outcome::Words(_) => None,
+        };
+        self.ask(Wish::Sleep(time), slept).await
+    }
+
+    async fn ask<T>(&self, wish: Wish, take: fn(Outcome<E>) -> Option<T>) -> T {
+        let mut wish = Some(wish);
+        poll_fn(|_| {
+            let mut desk = self.desk();
+            if let Some(wish) = wish.take() {
+                desk.wish = Some(wish);
+                return Poll::Pending;
+            }
+            // What does not fit was refused at the door of the step.
+            desk.outcome.take().and_then(take).map_or(Poll::Pending, Poll::Ready)
+        })
+        .await
+    }
+
+    fn desk(&self) -> MutexGuard<'_, Desk<E>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<E> Clone for Mailbox<E> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+impl<E> fmt::Debug for Mailbox<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Mailbox").field("seen", &self.desk().seen).finish_non_exhaustive()
+    }
+}
+
+/// An operation on its way.
+///
+/// ```
+/// use drivebus_drive::task::{Outcome, Read, Seen, Step, Task, Wish};
+/// use drivebus_rtu::{Instant, UnitAddress};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let unit = UnitAddress::new(1)?;
+/// // What unit 1 says twice in a row at 2100H.
+/// let mut task = Task::new(async move |line| {
+///     let mut last = line.read(Read::word(unit, 0x2100.into())).await?;
+///     loop {
+///         let next = line.read(Read::word(unit, 0x2100.into())).await?;
+///         if next == last {
+///             return Ok::<_, &str>(next);
+///         }
+///         last = next;
+///     }
+/// });
+/// let mut answers = [[1], [3], [3]].into_iter();
+/// let seen = Seen { now: Instant::ZERO, connection: 0, is_closed: false };
+/// let mut outcome = None;
+/// let told = loop {
+///     outcome = match task.step(seen, outcome)? {
+///         Step::Wish(Wish::Read(_)) => answers.next().map(|words| Outcome::Words(words.to_vec())),
+///         Step::Wish(_) => Some(Outcome::Slept),
+///         Step::Done(told) => break told,
+///     };
+/// };
+/// assert_eq!(told, Ok(vec![3]));
+/// # Ok(())
+/// # }
+/// ```
+#[must_use = "an operation does nothing until it is stepped"]
+pub struct Task<T, E> {
+    /// `None` once it is done.
+    operation: Option<Pin<Box<dyn Future<Output = T> + Send>>>,
+    mailbox: Mailbox<E>,
+    /// What is waited for.
+    wish: Option<Wish>,
+}
+
+impl<T, E> Task<T, E> {
+    /// An operation that waits for nothing but its mailbox. Nothing of it is done yet.
+    pub fn new<F>(operation: impl FnOnce(Mailbox<E>) -> F) -> Self
+    where
+        F: Future<Output = T> + Send + 'static,
+    {
+        let seen = Seen { now: Instant::ZERO, connection: 0, is_closed: false };
+        let mailbox = Mailbox(Arc::new(Mutex::new(Desk { seen, wish: None, outcome: None })));
+        Self { operation: Some(Box::pin(operation(mailbox.clone()))), mailbox, wish: None }
+    }
+
+    /// Goes on until the operation wants something, or is done.
+    ///
+    /// `outcome` is what came of the last wish, and `None` at the first step. Moments must not go back.
+    ///
+    /// # Errors
+    ///
+    /// [`Misuse`]: the step was not made, or, as [`Misuse::Stuck`], came to nothing.
+    pub fn step(&mut self, seen: Seen, outcome: Option<Outcome<E>>) -> Result<Step<T>, Misuse> {
+        let operation = self.operation.as_mut().ok_or(Misuse::Over)?;
+        let mut desk = self.mailbox.desk();
+        if seen.now < desk.seen.now {
+            return Err(Misuse::WentBack(desk.seen.now.saturating_duration_since(seen.now)));
+        }
+        match (&self.wish, &outcome) {
+            (None, Some(_)) => return Err(Misuse::NotWished),
+            (Some(wish), None) => return Err(Misuse::NoOutcome(wish.clone())),
+            (Some(wish), Some(outcome)) if !wish.is_met_by(outcome) => return Err(Misuse::Unfit(wish.clone())),
+            _ => {}
+        }
+        desk.seen = seen;
+        desk.outcome = outcome;
+        drop(desk);
+        self.wish = None;
+        if let Poll::Ready(done) = operation.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
+            self.operation = None;
+            return Ok(Step::Done(done));
+        }
+        self.wish = self.mailbox.desk().wish.take();
+        self.wish.clone().map(Step::Wish).ok_or(Misuse::Stuck)
+    }
+
+    /// What is wished for and has no outcome yet: what a task that is dropped now leaves open. `None` before its first
+    /// step, and where it is done.
+    pub fn pending(&self) -> Option<&Wish> {
+        self.wish.as_ref()
+    }
+}
+
+impl<T, E> fmt::Debug for Task<T, E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Task")
+            .field("is_done", &self.operation.is_none())
+            .field("pending", &self.wish)
+            .finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests;

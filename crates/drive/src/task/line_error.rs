@@ -1,0 +1,38 @@
+//! What an operation has to know of an error of the line, whoever's error that is.
+
+use drivebus_rtu::{ExceptionCode, Meaning};
+
+/// An error of whoever drives a task, as operations look at it.
+pub trait LineError {
+    /// What went wrong.
+    fn cause(&self) -> Cause;
+
+    /// All that came; empty where nothing did.
+    fn raw(&self) -> &[u8];
+
+    /// Whether the request went out: what it was to do may have been done then, unless it was refused.
+    fn was_sent(&self) -> bool;
+}
+
+/// What went wrong with a wish.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Cause {
+    /// The unit stayed silent.
+    NoAnswer,
+    /// Bytes came, and no valid answer.
+    BadAnswer,
+    /// The unit refused, by this exception, which means that for it.
+    Refused(ExceptionCode, Meaning),
+    /// The port was lost, or is closed.
+    Port,
+    /// It was not done, for a reason that says nothing of the unit.
+    Other,
+}
+
+impl Cause {
+    /// Whether the line failed: the unit did not say anything that counts.
+    pub const fn is_of_the_line(self) -> bool {
+        matches!(self, Self::NoAnswer | Self::BadAnswer | Self::Port)
+    }
+}
