@@ -38,6 +38,7 @@ __all__ = [
     "SimulatedLine",
     "Simulator",
     "Sniffer",
+    "Task",
     "__version__",
     "begin_of_child",
     "check_port_options",
@@ -56,6 +57,7 @@ __all__ = [
     "forbidden",
     "frame_len",
     "frames_in",
+    "identify",
     "is_write",
     "judge",
     "listed_codes",
@@ -68,6 +70,7 @@ __all__ = [
     "read_sheet",
     "run_time_folder",
     "touched",
+    "usable",
 ]
 
 HALTS: Final[tuple[str, str, str]]
@@ -573,6 +576,44 @@ class Apart:
         """The place to ask; else the family to take the unit for; else those that it may be, which may be none.
 
         NotAllowed: there is no such place or command.
+        """
+
+def identify(unit: int, /) -> Task:
+    """Finds out what *unit* is, by reads of one word each.
+
+    Its result is `"found"` and what was found, by name: `candidates`, `family`, `code`, `titles`, `certainty`, and the
+    `reason`. That is `"code"`, the place, the certainty by the code alone, its source, and an answer that speaks
+    against it or None; `"answers"` and the places, each with whether it was answered; or `"nothing"` and the answers
+    that came. Or its result is `"unreached"` and the exception of a gateway; or `"busy"`, the place, the last
+    exception, how often the unit refused, and the last error.
+    """
+
+def usable(certainty: str, candidates: Sequence[str], unverified: bool, /) -> str | None:
+    """The shipped family of *candidates* that a unit surely enough is to command a motor by it."""
+
+@final
+class Task:
+    """An operation on its way: it wishes for something, and goes on with what came of that."""
+
+    def step(
+        self, now: float, connection: int, closed: bool, outcome: list[int] | Exception | None = None, /
+    ) -> tuple[str, Any]:
+        """Goes on until it wishes for something, or is done.
+
+        Args:
+            now: Seconds on the line's clock. A moment before the last one counts as that.
+            connection: The `reconnects` of the line.
+            closed: Whether the line was closed for good.
+            outcome: What came of the last wish: words of a read, an error of the line; None at the first step, and
+                where a sleep is over.
+
+        Returns:
+            `"read"` and the arguments of a `drivebus.line.asking.Read`; `"sleep"` and seconds of the line's clock; or
+            `"done"` and the result.
+
+        Raises:
+            DrivebusError: It failed; an error of the line that it does not handle comes back as it was given.
+            RuntimeError: *outcome* is none of the last wish, or the task is done. It is as it was before.
         """
 
 def code_places() -> list[int]:

@@ -6,7 +6,6 @@ import asyncio
 import warnings
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +14,8 @@ import pytest
 import drivebus
 import drivebus.aio
 from drivebus import Bus, DrivebusError, Identification, NotAllowed, Simulator
-from drivebus.identify import codes, identify
+from drivebus.identify import identify
 from drivebus.line.asking import Read
-from drivebus.profile.facts import IdentificationCode
 
 UNITS = {1: "gd350", 2: "gd300", 3: "vfd500", 4: "gd600", 5: "gd35", 6: "gd3000"}
 CODE, FAULT_500, SPEED_UNIT_500 = 0x2103, 0x1900, 0x1E0E
@@ -72,13 +70,29 @@ def test_how_sure_it_is(
     assert simulator.drive(unit).writes() == []
 
 
-def test_a_code_that_no_document_prints(simulator: Simulator, bus: Bus, monkeypatch: pytest.MonkeyPatch) -> None:
-    row = replace(codes.listed_at(CODE, 0x0180)[0], verified=False, source="a program")
-    monkeypatch.setattr(codes, "listed_at", lambda _, word: [row] if word == 0x0180 else [])
-    bus.read(1, CODE)  # first contact is over
-    answer(simulator, 1, 0x0180)
+class Found:
+    """A task of the core that found this out by a code: how sure each is by the rows of a code, its own tests hold."""
+
+    def __init__(self, code: int, candidates: list[str], titles: list[str], certainty: str, source: str) -> None:
+        self._told = {
+            "candidates": candidates,
+            "family": candidates[0] if len(candidates) == 1 else None,
+            "code": code,
+            "titles": titles,
+            "certainty": certainty,
+            "reason": ("code", (CODE, certainty, source, None)),
+        }
+
+    def step(self, *_: object) -> tuple[str, object]:
+        return "done", ("found", self._told)
+
+
+def test_a_code_that_no_document_prints(bus: Bus, monkeypatch: pytest.MonkeyPatch) -> None:
+    thin = Found(0x0180, ["sd1"], ["IMO SD1"], "unverified", "a program")
+    monkeypatch.setattr("drivebus._native.identify", lambda _: thin)
     found = bus.identify(1)
     assert (found.certainty, found.family, found.candidates) == ("unverified", "sd1", ("sd1",))
+    assert found.reason == "it reports 0180H, which no document prints for IMO SD1, only a program"
 
 
 def test_a_family_without_a_profile(simulator: Simulator, bus: Bus) -> None:
@@ -197,10 +211,8 @@ def test_a_drive_that_is_taken_for_one_of_several_says_so(bus: Bus) -> None:
 def test_a_code_of_several_families_with_profiles_is_not_enough(
     bus: Bus, monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...]
 ) -> None:
-    rows = [
-        IdentificationCode(0x010A, name, name.upper(), (), verified=True, note="", source="a manual") for name in names
-    ]
-    monkeypatch.setattr("drivebus.identify.codes.listed_at", lambda _, word: rows if word == 0x010A else [])
+    several = Found(0x010A, list(names), [name.upper() for name in names], "shared", "a manual")
+    monkeypatch.setattr("drivebus._native.identify", lambda _: several)
     found = bus.identify(2)
     assert (found.certainty, found.candidates, found.family) == ("shared", names, None)
     all_but_last = ", ".join(names[:-1])

@@ -57,6 +57,11 @@ impl Families {
         std::iter::once(own).chain(others).cloned().collect()
     }
 
+    /// The one of this name.
+    pub fn named(&self, name: &str) -> Option<&Arc<Family>> {
+        self.known.iter().find(|family| family.name() == name)
+    }
+
     /// Each of them.
     pub fn iter(&self) -> impl Iterator<Item = &Arc<Family>> {
         self.known.iter()

@@ -45,12 +45,16 @@
 //! | `contradiction` | what speaks against a family |
 //! | `apart` | which family a unit may be, and what to ask it next |
 //! | `fall` | what is seen of a motor that was told to stop, and whether it proves that it obeys |
+//! | `asked` | questions to a unit, and which refusals are no answer yet |
+//! | `signatures` | whose signature a unit shows |
+//! | `identify` | what a unit of which nothing is known is |
 //! | `task` | operations that wait for a line, and how they are driven without one |
 
 #![forbid(unsafe_code)]
 
 mod answer;
 mod apart;
+mod asked;
 mod codes;
 mod contradiction;
 mod fall;
@@ -58,11 +62,16 @@ mod families;
 mod family;
 mod guard;
 mod harm;
+mod identify;
 mod rule;
+#[cfg(test)]
+mod scripted;
+mod signatures;
 pub mod task;
 
 pub use answer::{Answer, Said, meanings};
 pub use apart::{Apart, Verdict};
+pub use asked::{NotTold, answer_at, answer_once};
 pub use codes::Codes;
 pub use contradiction::Contradiction;
 pub use fall::{Fall, Look};
@@ -70,6 +79,7 @@ pub use families::Families;
 pub use family::{Family, HALTS};
 pub use guard::Forbidden;
 pub use harm::What;
+pub use identify::{Certainty, Identification, Reason, identify};
 pub use rule::{Rule, WhyNot};
 
 /// The examples of the README are tests.

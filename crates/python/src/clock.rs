@@ -1,6 +1,6 @@
 //! Moments of the core as Python's numbers.
 
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use drivebus_line::Bus as CoreBus;
 use drivebus_rtu::Instant;
@@ -30,6 +30,11 @@ pub(crate) fn unix_time() -> f64 {
 /// A moment of the line's clock in seconds since it began.
 pub(crate) fn to_seconds(moment: Instant) -> f64 {
     moment.saturating_duration_since(Instant::ZERO).as_secs_f64()
+}
+
+/// The moment at so many seconds of the line's clock. A line that was lost may have no clock any more: then its beginning.
+pub(crate) fn moment(seconds: f64) -> Instant {
+    Instant::ZERO + Duration::try_from_secs_f64(seconds).unwrap_or_default()
 }
 
 /// A moment of the simulation in seconds.

@@ -28,7 +28,7 @@ pub(crate) enum Class {
 }
 
 impl Class {
-    fn get(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+    pub(crate) fn get(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
         static CLASSES: [PyOnceLock<Py<PyType>>; 10] = [const { PyOnceLock::new() }; 10];
         let (index, name) = match self {
             Self::Port => (0, "PortError"),

@@ -18,6 +18,7 @@ mod format;
 mod frames;
 mod gateway;
 mod guard;
+mod identify;
 mod mailbox;
 mod open;
 mod overhear;
@@ -33,6 +34,7 @@ mod sim;
 mod sim_line;
 mod sniffer;
 mod tables;
+mod task;
 mod trace;
 
 /// But for `ending`, nothing here keeps state outside its objects, and each of those locks for itself: safe without the GIL.
@@ -60,6 +62,7 @@ mod _native {
     use crate::gateway::Gateway;
     #[pymodule_export]
     use crate::guard::{commanded_at, forbidden};
+    use crate::identify::{identify, usable};
     #[pymodule_export]
     use crate::mailbox::Mailbox;
     #[pymodule_export]
@@ -82,6 +85,8 @@ mod _native {
     use crate::sim_line::{SimulatedLine, fault_kinds};
     #[pymodule_export]
     use crate::sniffer::Sniffer;
+    #[pymodule_export]
+    use crate::task::Task;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

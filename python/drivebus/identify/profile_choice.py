@@ -6,7 +6,7 @@ import os
 import warnings
 from collections.abc import Mapping
 
-from drivebus import checks
+from drivebus import _native, checks
 from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed, SharedCodeWarning, WrongDrive, level_of_the_program
 from drivebus.identify.families import drive_as, one_of, shipped
@@ -49,9 +49,7 @@ async def profile_of(
 
 def usable(found: Identification, unverified: bool) -> str | None:
     """The profile that *found* is sure enough of to command a motor by it; with *unverified*, the only candidate."""
-    known = shipped(found.candidates)
-    sure = found.certainty in ("certain", "shared") or (unverified and len(found.candidates) == 1)
-    return known[0] if sure and len(known) == 1 else None
+    return _native.usable(found.certainty, found.candidates, unverified)
 
 
 def _sure_enough(found: Identification, unverified: bool) -> Profile:

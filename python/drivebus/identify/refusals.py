@@ -16,6 +16,7 @@ __all__ = [
     "Answer",
     "answer_at",
     "answer_once",
+    "busy",
     "passes",
     "tells_nothing",
 ]
@@ -85,14 +86,19 @@ async def answer_at(ask: Ask, unit: int, place: int) -> Answer:
                 again += 1
                 continue
             if not decides:
-                raise BadAnswer(
-                    f"unit {unit} is busy, or gets requests damaged: it refused {tables.shown(place)} with exception "
-                    f"{error.code:02X}H {again + 1} times",
-                    unit=unit,
-                    request=error.request,
-                    raw=error.raw,
-                    started=error.started,
-                    ended=error.ended,
-                ) from error
+                raise busy(unit, place, error.code, again + 1, error) from error
             return Answer(place, None, error.code)
         return Answer(place, word, None)
+
+
+def busy(unit: int, place: int, exception: int, times: int, error: Refused) -> BadAnswer:
+    """That *unit* refused *place* so many *times*, at last with *error*, and decided nothing by that."""
+    return BadAnswer(
+        f"unit {unit} is busy, or gets requests damaged: it refused {tables.shown(place)} with exception "
+        f"{exception:02X}H {times} times",
+        unit=unit,
+        request=error.request,
+        raw=error.raw,
+        started=error.started,
+        ended=error.ended,
+    )

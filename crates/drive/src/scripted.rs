@@ -1,0 +1,131 @@
+//! A unit for tests: it answers an operation by a script, and what was asked is kept.
+
+use std::time::Duration;
+
+use drivebus_drives::Place;
+use drivebus_rtu::{ExceptionCode, Instant, UnitAddress};
+use proptest::prelude::*;
+
+use crate::families::Families;
+use crate::family::Family;
+use crate::task::{Cause, LineError, Mailbox, Outcome, Read, Seen, Step, Task, Wish};
+
+/// Who is asked.
+pub(crate) const UNIT: UnitAddress = UnitAddress::by_name(5);
+
+/// An error of the scripted line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Fault {
+    pub(crate) cause: Cause,
+    pub(crate) raw: Vec<u8>,
+}
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?}", self.cause)
+    }
+}
+
+impl LineError for Fault {
+    fn cause(&self) -> Cause {
+        self.cause
+    }
+
+    fn raw(&self) -> &[u8] {
+        &self.raw
+    }
+
+    fn was_sent(&self) -> bool {
+        true
+    }
+}
+
+/// How the unit answers one question.
+pub(crate) type Reply = Result<u16, Fault>;
+
+/// It fails for this cause, and nothing came.
+pub(crate) fn fails(cause: Cause) -> Reply {
+    Err(Fault { cause, raw: Vec::new() })
+}
+
+/// It refuses by this exception, which means what the specification says.
+pub(crate) fn refuses(code: u8) -> Reply {
+    fails(Cause::Refused(ExceptionCode(code), ExceptionCode(code).meaning()))
+}
+
+/// A unit that has `words`, besides them what the profile of `family` prints, and of all else says that it has no such
+/// address.
+pub(crate) fn like<'f>(family: &'f Family, words: &'f [(u16, u16)]) -> impl FnMut(Read) -> Reply + 'f {
+    move |read| match words.iter().find(|(address, _)| Place::from(*address) == read.place) {
+        Some(&(_, word)) => Ok(word),
+        None if family.has(read.place) && !family.refuses(read.place) => Ok(0),
+        None => refuses(0x02),
+    }
+}
+
+/// The line of one test: its time, how often it was opened again, and what was asked.
+#[derive(Debug)]
+pub(crate) struct Script {
+    pub(crate) now: Instant,
+    pub(crate) connection: u64,
+    pub(crate) asked: Vec<Read>,
+}
+
+impl Script {
+    pub(crate) fn new() -> Self {
+        Self { now: Instant::ZERO, connection: 0, asked: Vec::new() }
+    }
+
+    /// What the operation comes to where `unit` is asked. Each question takes a millisecond; none is asked without end.
+    pub(crate) fn carry_out<T, F>(
+        &mut self,
+        mut unit: impl FnMut(Read) -> Reply,
+        operation: impl FnOnce(Mailbox<Fault>) -> F,
+    ) -> T
+    where
+        F: Future<Output = T> + Send + 'static,
+    {
+        self.asked.clear();
+        let mut task = Task::new(operation);
+        let mut outcome = None;
+        loop {
+            let seen = Seen { now: self.now, connection: self.connection, is_closed: false };
+            outcome = match task.step(seen, outcome).unwrap() {
+                Step::Done(done) => return done,
+                Step::Wish(Wish::Read(read)) => {
+                    self.asked.push(read);
+                    assert!(self.asked.len() < 400, "it asks without end");
+                    self.now = self.now + Duration::from_millis(1);
+                    Some(unit(read).map_or_else(Outcome::Failed, |word| Outcome::Words(vec![word])))
+                }
+                Step::Wish(wish) => panic!("it wants {wish}"),
+            };
+        }
+    }
+
+    /// The places that were asked for, in their order.
+    pub(crate) fn places(&self) -> Vec<u32> {
+        self.asked.iter().map(|read| read.place.number()).collect()
+    }
+}
+
+/// The shipped family of this name.
+pub(crate) fn shipped(name: &str) -> std::sync::Arc<Family> {
+    std::sync::Arc::clone(Families::shipped().named(name).unwrap())
+}
+
+/// Any way to answer.
+pub(crate) fn any_reply() -> impl Strategy<Value = Reply> {
+    let listed: Vec<u16> = Families::shipped().codes().all().collect();
+    let came = proptest::collection::vec(any::<u8>(), 0..6);
+    prop_oneof![
+        4 => any::<u16>().prop_map(Ok),
+        4 => (0u16..10).prop_map(Ok),
+        4 => proptest::sample::select(listed).prop_map(Ok),
+        6 => any::<u8>().prop_map(refuses),
+        6 => (0u8..12).prop_map(refuses),
+        3 => (proptest::sample::select(vec![Cause::NoAnswer, Cause::BadAnswer]), came)
+            .prop_map(|(cause, raw)| Err(Fault { cause, raw })),
+        1 => proptest::sample::select(vec![Cause::Port, Cause::Other]).prop_map(fails),
+    ]
+}

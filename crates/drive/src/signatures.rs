@@ -1,0 +1,71 @@
+//! Signatures: how units of a family without a code are told, by which words they answer and which they refuse.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use drivebus_drives::{Place, Signature};
+
+use crate::asked::{NotTold, answer_at};
+use crate::families::Families;
+use crate::family::Family;
+use crate::task::{Cause, LineError, Mailbox, Read};
+
+/// Which words a unit answered, and which it refused.
+pub(crate) type Asked = BTreeMap<Place, bool>;
+
+/// Those of `families` whose signature a unit shows, which is asked for more of it as in `read`.
+///
+/// What was asked before stands in `asked`, and what is asked goes there. Of a signature no more is asked once the unit
+/// does not show it, so that a unit of none of them is asked little.
+///
+/// # Errors
+///
+/// That the port is lost, and what is no answer of the unit. Silence shows no signature.
+pub(crate) async fn shown_by<'f, E: LineError>(
+    line: &Mailbox<E>,
+    families: &'f Families,
+    read: Read,
+    asked: &mut Asked,
+) -> Result<Vec<&'f Arc<Family>>, E> {
+    let mut shown = Vec::new();
+    for family in families.iter() {
+        if let Some(signature) = family.profile().signature()
+            && is_shown(line, signature, read, asked).await?
+        {
+            shown.push(family);
+        }
+    }
+    Ok(shown)
+}
+
+async fn is_shown<E: LineError>(
+    line: &Mailbox<E>,
+    signature: &Signature,
+    read: Read,
+    asked: &mut Asked,
+) -> Result<bool, E> {
+    for (place, wanted) in wanted(signature) {
+        let is_answered = match asked.get(&place) {
+            Some(&known) => known,
+            None => match answer_at(line, Read { place, ..read }).await {
+                Ok(answer) if answer.passes() => return Ok(false),
+                Ok(answer) => *asked.entry(place).or_insert(answer.word().is_some()),
+                Err(NotTold::Failed(error)) if !matches!(error.cause(), Cause::NoAnswer | Cause::BadAnswer) => {
+                    return Err(error);
+                }
+                // Neither, then: no signature has it.
+                Err(_) => return Ok(false),
+            },
+        };
+        if is_answered != wanted {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// The places of `signature`, and whether its units answer there.
+pub(crate) fn wanted(signature: &Signature) -> impl Iterator<Item = (Place, bool)> {
+    let answers = signature.answers.iter().map(|&place| (place, true));
+    answers.chain(signature.refuses.iter().map(|&place| (place, false)))
+}

@@ -1,0 +1,149 @@
+//! Operations of the core for Python: a task that wishes for what `drivebus.line.tasks` asks of its bus.
+
+use std::fmt::Debug;
+use std::sync::{Mutex, TryLockError};
+
+use drivebus_drive::task::{Cause, LineError, Mailbox, Outcome, Read, Seen, Step, Wish};
+use drivebus_drive::task::{Misuse, Task as Driven};
+use drivebus_rtu::{ExceptionCode, Instant, Meaning};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use crate::clock::moment;
+use crate::errors::Class;
+
+/// An error of a bus: the exception itself, and what operations look at of it.
+#[derive(Debug)]
+pub(crate) struct Failed {
+    error: PyErr,
+    cause: Cause,
+    raw: Vec<u8>,
+    was_sent: bool,
+}
+
+impl Failed {
+    fn of(error: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = error.py();
+        let is = |class: Class| error.is_instance(class.get(py)?);
+        let cause = if is(Class::Refused)? {
+            let code = ExceptionCode(error.getattr("code")?.extract()?);
+            let means: String = error.getattr("means")?.extract()?;
+            let meaning = Meaning::ALL.into_iter().find(|meaning| meaning.name() == means);
+            Cause::Refused(code, meaning.unwrap_or_else(|| code.meaning()))
+        } else if is(Class::Port)? {
+            Cause::Port
+        } else if is(Class::NoAnswer)? {
+            Cause::NoAnswer
+        } else if is(Class::BadAnswer)? {
+            Cause::BadAnswer
+        } else {
+            Cause::Other
+        };
+        Ok(Self {
+            cause,
+            raw: error.getattr("raw")?.extract()?,
+            was_sent: !error.getattr("started")?.is_none(),
+            error: PyErr::from_value(error.clone()),
+        })
+    }
+}
+
+impl LineError for Failed {
+    fn cause(&self) -> Cause {
+        self.cause
+    }
+
+    fn raw(&self) -> &[u8] {
+        &self.raw
+    }
+
+    fn was_sent(&self) -> bool {
+        self.was_sent
+    }
+}
+
+impl From<Failed> for PyErr {
+    /// The exception as the bus raised it.
+    fn from(failed: Failed) -> Self {
+        failed.error
+    }
+}
+
+type Operation = Driven<PyResult<Py<PyAny>>, Failed>;
+
+/// An operation on its way; see `python/drivebus/_native.pyi`.
+#[pyclass(frozen, module = "drivebus._native")]
+#[derive(Debug)]
+pub(crate) struct Task(Mutex<(Operation, Instant)>);
+
+impl Task {
+    /// The `operation`, whose result is told to Python as `told` says.
+    pub(crate) fn of<T, F>(
+        operation: impl FnOnce(Mailbox<Failed>) -> F,
+        told: impl FnOnce(Python<'_>, T) -> PyResult<Py<PyAny>> + Send + 'static,
+    ) -> Self
+    where
+        T: Send + 'static,
+        F: Future<Output = T> + Send + 'static,
+    {
+        let task = Driven::new(|line| {
+            let operation = operation(line);
+            async move {
+                let done = operation.await;
+                Python::attach(|py| told(py, done))
+            }
+        });
+        Self(Mutex::new((task, Instant::ZERO)))
+    }
+}
+
+#[pymethods]
+impl Task {
+    #[pyo3(signature = (now, connection, closed, outcome=None, /))]
+    fn step<'py>(
+        &self,
+        py: Python<'py>,
+        now: f64,
+        connection: u64,
+        closed: bool,
+        outcome: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<(&'static str, Bound<'py, PyAny>)> {
+        let mut held = match self.0.try_lock() {
+            Ok(held) => held,
+            Err(TryLockError::Poisoned(held)) => held.into_inner(),
+            Err(TryLockError::WouldBlock) => return Err(PyRuntimeError::new_err("another thread makes a step")),
+        };
+        let (task, latest) = &mut *held;
+        let outcome = match (outcome, task.pending()) {
+            (None, Some(Wish::Sleep(_))) => Some(Outcome::Slept),
+            (None, _) => None,
+            (Some(given), _) => Some(match given.extract() {
+                Ok(words) => Outcome::Words(words),
+                Err(_) => Outcome::Failed(Failed::of(given)?),
+            }),
+        };
+        // Of a line that has no clock any more the time stands still.
+        *latest = (*latest).max(moment(now));
+        let seen = Seen { now: *latest, connection, is_closed: closed };
+        match task.step(seen, outcome).map_err(|misuse: Misuse| PyRuntimeError::new_err(misuse.to_string()))? {
+            Step::Done(done) => Ok(("done", done?.into_bound(py))),
+            Step::Wish(Wish::Sleep(time)) => Ok(("sleep", time.as_secs_f64().into_pyobject(py)?.into_any())),
+            Step::Wish(Wish::Read(read)) => Ok(("read", told_of(py, read)?)),
+            Step::Wish(wish) => Err(unknown(&wish)),
+        }
+    }
+}
+
+/// What a later core says or wants besides.
+pub(crate) fn unknown(what: &impl Debug) -> PyErr {
+    PyRuntimeError::new_err(format!("nothing here knows of {what:?}"))
+}
+
+/// A read, in the order of the attributes of `drivebus.line.asking.Read`.
+fn told_of(py: Python<'_>, read: Read) -> PyResult<Bound<'_, PyAny>> {
+    let Read { unit, place, count, is_urgent, timeout, retries, .. } = read;
+    let table = place.table.name();
+    let timeout = timeout.map(|time| time.as_secs_f64());
+    let told = (unit.get(), place.address, count, table, is_urgent, false, timeout, retries);
+    Ok(told.into_pyobject(py)?.into_any())
+}
