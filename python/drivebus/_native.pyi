@@ -27,12 +27,14 @@ __all__ = [
     "Fall",
     "Family",
     "Gateway",
+    "Identity",
     "Mailbox",
     "Plan",
     "Poller",
     "Profile",
     "Requests",
     "Rule",
+    "SameUnit",
     "SerialFormat",
     "SimulatedDrive",
     "SimulatedLine",
@@ -64,7 +66,6 @@ __all__ = [
     "misses",
     "only_reads",
     "open_bus",
-    "passes",
     "port_facts",
     "port_url",
     "read_sheet",
@@ -531,33 +532,18 @@ class Family:
     """
 
     def __new__(cls, profile: Profile, /) -> Family: ...
-    @property
-    def is_listed(self) -> bool:
-        """Whether its profile or a shipped one lists a code of the family."""
-    @property
-    def signature(self) -> tuple[list[int], list[int]] | None:
-        """The places that its units answer, and those that they refuse; that of the family below an overlay."""
-    def is_own(self, place: int, word: int, /) -> bool:
-        """Whether *word* (0..=0xFFFF) at *place* is a code of a family that its units report as."""
-    def is_signed_by(self, answers: Sequence[_Answer], /) -> bool:
-        """Whether *answers* have all of its signature."""
-    def lacks_address(self, code: int, /) -> bool:
-        """Whether its units say by the exception *code* (0..=0xFF) that they have no such address."""
-    def is_put_off_by(self, answer: _Answer, /) -> bool:
-        """Whether *answer* is a refusal that passes, and so tells nothing of one of its units."""
     def halt_for(self, command: str, /) -> str | None:
         """The command by which its units do what *command* is for; None where they have none that halts."""
     def harmed(self, what: str | int, /) -> list[str]:
         """The shipped families that *what* does harm to where it is written to a unit named as one of this family."""
     def is_harmed_by(self, what: str | int, named: Family, /) -> bool:
         """Whether *what*, written to a unit that was named as one of *named*, does harm to one of this family."""
-    def contradiction(self, answers: Sequence[_Answer], /) -> tuple[str, int, int, list[dict[str, Any]]] | None:
-        """What speaks against it: of which kind, where, the word or the exception that came, and the rows of a code.
+    def contradiction(self, answers: Sequence[_Answer], /) -> tuple[str, Any] | None:
+        """What speaks against it.
 
-        Kinds are `code`, `no_address` and `no_function`.
+        `"code"`: the place, the word, and the rows that are listed of it. `"no_address"` and `"no_function"`: the
+        place, and the exception. `"signature"`: the families whose signature the unit has, of a `SameUnit` alone.
         """
-    def is_suspicious(self, answers: Sequence[_Answer], /) -> bool:
-        """Whether one of its units would hardly give these *answers*."""
 
 @final
 class Apart:
@@ -577,6 +563,49 @@ class Apart:
 
         NotAllowed: there is no such place or command.
         """
+
+@final
+class Identity:
+    """What a unit said of itself, asked in the words of one family; all handles of the unit have the same one.
+
+    A connection is the `reconnects` of the line, and *now* its clock in seconds.
+    """
+
+    def __new__(cls, connection: int, /) -> Identity: ...
+    @property
+    def connection(self) -> int:
+        """The one over which it was heard."""
+    def is_sure(self, connection: int, /) -> bool:
+        """Whether it said, over this connection, what no family says that its halts could start."""
+    def is_harmless(self, place: int, connection: int, /) -> bool:
+        """Whether a word at *place* was found to do no harm to it, over this connection."""
+    def found_harmless(self, place: int, connection: int, /) -> None:
+        """A word at *place* does it no harm, for as long as the port stays open."""
+    def is_known(self, connection: int, /) -> bool:
+        """Whether it said all that it is asked, over this connection, and nothing against its name."""
+    def is_old(self, now: float, /) -> bool:
+        """Whether what it said was said so long ago that another drive may have taken its place unseen."""
+    def settle(self, connection: int, now: float, /) -> None:
+        """Takes it for surely what it was named as, for as long as the port stays open."""
+    def is_another(self) -> None:
+        """It showed that it is not what it was named as: that is asked again."""
+
+@final
+class SameUnit:
+    """A unit that was named as one of a family."""
+
+    def __new__(cls, unit: int, family: Family, identity: Identity, trusted: bool, /) -> SameUnit: ...
+    def gave(self, code: int, now: float, /) -> None:
+        """Takes it that the unit gave the identification code *code* (0..=0xFFFF) at *now*."""
+    def check(self, judged: bool, urgent: bool, /) -> Task:
+        """Asks the unit what it is, if the port was opened again or nobody has asked yet.
+
+        Its result is `"same"` and the connection for which that holds. Or `"contradicts"` and what speaks against the
+        family, as `Family.contradiction` has it; `"unsaid"` and the error of the line; `"put_off"` and what was told;
+        `"another"`, what was told before and what is told now.
+        """
+    def contradiction(self, urgent: bool, /) -> Task:
+        """Asks the unit what it is. Its result is what speaks against the family, or None."""
 
 def identify(unit: int, /) -> Task:
     """Finds out what *unit* is, by reads of one word each.

@@ -20,7 +20,7 @@ from click.testing import CliRunner
 from drivebus import Bus, Found, NotAllowed, Profile, Simulator, aio, profiles, tables
 from drivebus.cli import cli
 from drivebus.doctor import Finding, examine
-from drivebus.identify import codes, signatures
+from drivebus.identify import codes
 from drivebus.line import huanyang
 from drivebus.line.scan_order import PROTOCOLS
 from drivebus.line_search.order import candidates
@@ -235,9 +235,9 @@ class TestTraps:
 
     def test_no_word_that_a_scan_asks_for_looks_like_a_command(self) -> None:
         asked = {*codes.registers()}
-        for signature in signatures.listed().values():
-            asked |= {*signature["answers"], *signature["refuses"]}
         for profile in map(Profile.builtin, profiles()):
+            signature = profile.signature() or {"answers": [], "refuses": []}
+            asked |= {*signature["answers"], *signature["refuses"]}
             state = profile.role("state")
             if profile.identifications() and state is not None:
                 place = profile.describe(state).place

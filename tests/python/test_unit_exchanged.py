@@ -17,7 +17,7 @@ from typing import NamedTuple
 import pytest
 
 from drivebus import Bus, Drive, DrivebusError, NotStopped, Simulator, Unconfirmed
-from drivebus.identify import same_unit
+from drivebus.identify.same_unit import SameUnit
 from drivebus.operations.aim import Aim, Target
 
 
@@ -97,7 +97,7 @@ def runs(unit: Simulator) -> bool:
 def test_one_that_the_halt_of_another_started_is_halted_as_itself(
     line: Line, by: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(same_unit, "_HOLDS", 0.0)
+    monkeypatch.setattr(SameUnit, "is_old", lambda *_: True)
     line.cable.move()
     with suppress(DrivebusError):
         line.drive.stop() if by == "stop" else line.bus.stop_all()
@@ -148,7 +148,7 @@ def test_an_answer_that_is_lost_leaves_it_not_running(line: Line, monkeypatch: p
 
 @pytest.mark.parametrize("line", [("gd350", "eds300")], indirect=True)
 def test_a_value_is_not_written_to_it_afterwards(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(same_unit, "_HOLDS", 0.0)
+    monkeypatch.setattr(SameUnit, "is_old", lambda *_: True)
     line.cable.move()
     with suppress(DrivebusError):
         line.drive.stop()

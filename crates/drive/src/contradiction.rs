@@ -1,8 +1,11 @@
 //! Whether what a unit says of itself speaks against the family that it was named as.
 //!
 //! What speaks against one is only what documents or other programs say of another family: a code that is listed for that,
-//! or a word that units of the named one always have, refused as an address that there is none. An unknown code tells
-//! nothing, for firmwares differ; nor does a locked drive, nor a silent one.
+//! its signature, or a word that units of the named one always have, refused as an address that there is none. An unknown
+//! code tells nothing, for firmwares differ; nor does a locked drive, nor a silent one.
+
+use std::fmt;
+use std::sync::Arc;
 
 use drivebus_drives::{Evidence, Identification, Place, Table};
 use drivebus_rtu::ExceptionCode;
@@ -12,9 +15,9 @@ use crate::codes;
 use crate::family::Family;
 
 /// What speaks against a family.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 #[non_exhaustive]
-pub enum Contradiction<'f> {
+pub enum Contradiction {
     /// The unit gave a code of other families.
     Code {
         /// Where it was asked.
@@ -22,7 +25,7 @@ pub enum Contradiction<'f> {
         /// The code.
         word: u16,
         /// What is listed of it; never empty.
-        rows: Vec<&'f Identification>,
+        rows: Vec<Identification>,
     },
     /// The unit says that it has no such address, and each unit of the family has.
     NoAddress {
@@ -38,13 +41,43 @@ pub enum Contradiction<'f> {
         /// How it refused.
         code: ExceptionCode,
     },
+    /// The unit answers and refuses what those of these families do; never empty.
+    Signature(Vec<Arc<Family>>),
+}
+
+impl fmt::Display for Contradiction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Code { place, word, rows } => {
+                write!(f, "the unit reports {word:04X}H at {place}, a code of ")?;
+                each(f, rows.iter().map(|row| row.title.as_str()))
+            }
+            Self::NoAddress { place, code } => {
+                write!(f, "the unit refuses {place} (exception {:02X}H: there is no such address)", code.0)
+            }
+            Self::NoFunction { place, code } => {
+                write!(f, "the unit refuses {place} (exception {:02X}H: there is no such function)", code.0)
+            }
+            Self::Signature(families) => {
+                f.write_str("the unit answers and refuses what one of these does: ")?;
+                each(f, families.iter().map(|family| family.profile().title()))
+            }
+        }
+    }
+}
+
+fn each<'a>(f: &mut fmt::Formatter<'_>, names: impl Iterator<Item = &'a str>) -> fmt::Result {
+    for (nth, name) in names.enumerate() {
+        write!(f, "{}{name}", if nth == 0 { "" } else { ", " })?;
+    }
+    Ok(())
 }
 
 impl Family {
     /// What among `answers` speaks against this family; `None` if nothing does.
     ///
     /// A code says most: what the unit is, and not only what it is not.
-    pub fn contradiction(&self, answers: &[Answer]) -> Option<Contradiction<'_>> {
+    pub fn contradiction(&self, answers: &[Answer]) -> Option<Contradiction> {
         if !self.is_known_by_something() {
             return None;
         }
@@ -59,19 +92,31 @@ impl Family {
         self.is_known_by_something() && answers.iter().any(|&answer| self.is_surprised_by(answer))
     }
 
+    /// What speaks against this family where a unit has the signature of each of `shown`.
+    pub(crate) fn other_signature<'f>(
+        &self,
+        shown: impl IntoIterator<Item = &'f Arc<Family>>,
+    ) -> Option<Contradiction> {
+        let shown: Vec<_> = shown.into_iter().cloned().collect();
+        let is_own = |family: &Arc<Family>| self.profile().reports_as().iter().any(|name| name == family.name());
+        (!shown.is_empty() && !shown.iter().any(is_own)).then_some(Contradiction::Signature(shown))
+    }
+
     /// Not so of somebody's own that says nothing of how its units are known: they may be anything.
     fn is_known_by_something(&self) -> bool {
         self.profile().role("identification").is_some() || self.signature().is_some() || self.is_shipped()
     }
 
-    fn by_code(&self, answer: Answer) -> Option<Contradiction<'_>> {
+    fn by_code(&self, answer: Answer) -> Option<Contradiction> {
         let (place, word) = (answer.place, answer.word()?);
         let rows: Vec<_> = self.rows(place, word).collect();
+        let is_none = rows.is_empty();
         let is_own = rows.iter().any(|row| codes::is_own(self.profile(), row));
-        (!rows.is_empty() && !is_own).then_some(Contradiction::Code { place, word, rows })
+        let rows = || rows.into_iter().cloned().collect();
+        (!is_none && !is_own).then(|| Contradiction::Code { place, word, rows: rows() })
     }
 
-    fn by_refusal(&self, answer: Answer) -> Option<Contradiction<'_>> {
+    fn by_refusal(&self, answer: Answer) -> Option<Contradiction> {
         let (place, code) = (answer.place, answer.exception()?);
         if !self.must_have(place) {
             return None;

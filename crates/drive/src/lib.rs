@@ -48,6 +48,7 @@
 //! | `asked` | questions to a unit, and which refusals are no answer yet |
 //! | `signatures` | whose signature a unit shows |
 //! | `identify` | what a unit of which nothing is known is |
+//! | `same_unit` | whether a unit is what it was named as, and still the one it was |
 //! | `task` | operations that wait for a line, and how they are driven without one |
 
 #![forbid(unsafe_code)]
@@ -64,6 +65,7 @@ mod guard;
 mod harm;
 mod identify;
 mod rule;
+mod same_unit;
 #[cfg(test)]
 mod scripted;
 mod signatures;
@@ -81,6 +83,7 @@ pub use guard::Forbidden;
 pub use harm::What;
 pub use identify::{Certainty, Identification, Reason, identify};
 pub use rule::{Rule, WhyNot};
+pub use same_unit::{Identity, NotSame, SameUnit, Told};
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

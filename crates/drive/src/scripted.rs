@@ -129,3 +129,8 @@ pub(crate) fn any_reply() -> impl Strategy<Value = Reply> {
         1 => proptest::sample::select(vec![Cause::Port, Cause::Other]).prop_map(fails),
     ]
 }
+
+/// Any shipped family.
+pub(crate) fn any_family() -> impl Strategy<Value = std::sync::Arc<Family>> {
+    proptest::sample::select(Families::shipped().iter().cloned().collect::<Vec<_>>())
+}

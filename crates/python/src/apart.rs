@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use drivebus_drive::{self as drive, Answer, Contradiction, Families, HALTS, Said, Verdict, What};
-use drivebus_drives::{Command, Place, Signature};
+use drivebus_drives::{Command, Place};
 use drivebus_rtu::ExceptionCode;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -12,6 +12,7 @@ use crate::convert::{place_of, shown};
 use crate::errors::{bad_argument, refuse};
 use crate::profile::Profile;
 use crate::tables;
+use crate::task::unknown;
 
 /// An answer: in Python a place, and the word that came or the exception by which it was refused.
 #[derive(Debug, Clone, Copy)]
@@ -31,8 +32,8 @@ impl<'py> FromPyObject<'_, 'py> for Heard {
 /// What to ask, as what to take the unit, and else what it may be, each by its name.
 type Told = (Option<u32>, Option<String>, Vec<String>);
 
-/// What speaks against a family: of which kind, where, the word or the exception that came, and what is listed of a code.
-type Against<'py> = (&'static str, u32, u16, Vec<Bound<'py, PyDict>>);
+/// What speaks against a family: of which kind, and what of it Python words.
+type Against<'py> = (&'static str, Bound<'py, PyAny>);
 
 /// One family of drives, by what its units answer and refuse.
 #[pyclass(name = "Family", frozen, module = "drivebus._native")]
@@ -40,9 +41,8 @@ type Against<'py> = (&'static str, u32, u16, Vec<Bound<'py, PyDict>>);
 pub(crate) struct Family(Arc<drive::Family>);
 
 impl Family {
-    /// What it is in the core.
-    pub(crate) fn core(&self) -> Arc<drive::Family> {
-        Arc::clone(&self.0)
+    pub(crate) fn core(&self) -> &Arc<drive::Family> {
+        &self.0
     }
 }
 
@@ -52,37 +52,6 @@ impl Family {
     #[pyo3(signature = (profile, /))]
     fn new(profile: &Profile) -> Self {
         Self(Families::shipped().family(&profile.core()))
-    }
-
-    #[getter]
-    fn is_listed(&self) -> bool {
-        self.0.is_listed()
-    }
-
-    #[getter]
-    fn signature(&self) -> Option<(Vec<u32>, Vec<u32>)> {
-        let numbers = |places: &[Place]| places.iter().map(|place| place.number()).collect();
-        self.0.signature().map(|Signature { answers, refuses, .. }| (numbers(answers), numbers(refuses)))
-    }
-
-    #[pyo3(signature = (place, word, /))]
-    fn is_own(&self, place: &Bound<'_, PyAny>, word: u16) -> PyResult<bool> {
-        Ok(self.0.is_own(place_of(place)?, word))
-    }
-
-    #[pyo3(signature = (answers, /))]
-    fn is_signed_by(&self, answers: Vec<Heard>) -> bool {
-        self.0.is_signed_by(&all(answers))
-    }
-
-    #[pyo3(signature = (code, /))]
-    fn lacks_address(&self, code: u8) -> bool {
-        self.0.lacks_address(ExceptionCode(code))
-    }
-
-    #[pyo3(signature = (answer, /))]
-    fn is_put_off_by(&self, answer: Heard) -> bool {
-        self.0.is_put_off_by(answer.0)
     }
 
     #[pyo3(signature = (command, /))]
@@ -103,23 +72,7 @@ impl Family {
 
     #[pyo3(signature = (answers, /))]
     fn contradiction<'py>(&self, py: Python<'py>, answers: Vec<Heard>) -> PyResult<Option<Against<'py>>> {
-        let answers = all(answers);
-        let against = match self.0.contradiction(&answers) {
-            Some(Contradiction::Code { place, word, rows }) => {
-                let rows = rows.into_iter().map(|row| tables::identification(py, row)).collect::<PyResult<_>>()?;
-                ("code", place, word, rows)
-            }
-            Some(Contradiction::NoAddress { place, code }) => ("no_address", place, code.0.into(), Vec::new()),
-            Some(Contradiction::NoFunction { place, code }) => ("no_function", place, code.0.into(), Vec::new()),
-            _ => return Ok(None),
-        };
-        let (kind, place, said, rows) = against;
-        Ok(Some((kind, place.number(), said, rows)))
-    }
-
-    #[pyo3(signature = (answers, /))]
-    fn is_suspicious(&self, answers: Vec<Heard>) -> bool {
-        self.0.is_suspicious(&all(answers))
+        self.0.contradiction(&all(answers)).map(|found| against(py, found)).transpose()
     }
 }
 
@@ -196,11 +149,22 @@ pub(crate) fn code_rows(py: Python<'_>, place: u32, word: u16) -> PyResult<Vec<B
     rows.iter().map(|row| tables::identification(py, row)).collect()
 }
 
-/// Whether an answer is a refusal that passes, whatever the unit is.
-#[pyfunction]
-#[pyo3(signature = (answer, /))]
-pub(crate) fn passes(answer: Heard) -> bool {
-    answer.0.passes()
+/// What speaks against a family, for Python.
+pub(crate) fn against(py: Python<'_>, found: Contradiction) -> PyResult<Against<'_>> {
+    Ok(match found {
+        Contradiction::Code { place, word, rows } => {
+            let rows = rows.iter().map(|row| tables::identification(py, row)).collect::<PyResult<Vec<_>>>()?;
+            ("code", (place.number(), word, rows).into_pyobject(py)?.into_any())
+        }
+        Contradiction::NoAddress { place, code } => {
+            ("no_address", (place.number(), code.0).into_pyobject(py)?.into_any())
+        }
+        Contradiction::NoFunction { place, code } => {
+            ("no_function", (place.number(), code.0).into_pyobject(py)?.into_any())
+        }
+        Contradiction::Signature(families) => ("signature", names(&families).into_pyobject(py)?.into_any()),
+        found => return Err(unknown(&found)),
+    })
 }
 
 fn names(families: &[Arc<drive::Family>]) -> Vec<String> {

@@ -28,6 +28,7 @@ mod profile;
 mod pyserial;
 mod requests;
 mod rule;
+mod same_unit;
 mod sheet;
 mod signals;
 mod sim;
@@ -44,7 +45,7 @@ mod _native {
     use pyo3::types::PyTuple;
 
     #[pymodule_export]
-    use crate::apart::{Apart, Family, code_places, code_rows, listed_codes, passes};
+    use crate::apart::{Apart, Family, code_places, code_rows, listed_codes};
     #[pymodule_export]
     use crate::bus::Bus;
     #[pymodule_export]
@@ -77,6 +78,8 @@ mod _native {
     use crate::requests::{Asked, Requests, open_bus};
     #[pymodule_export]
     use crate::rule::Rule;
+    #[pymodule_export]
+    use crate::same_unit::{Identity, SameUnit};
     #[pymodule_export]
     use crate::sheet::read_sheet;
     #[pymodule_export]

@@ -14,7 +14,7 @@ from drivebus.profile import Profile
 from drivebus.profile.facts import IdentificationCode
 from drivebus.profile.family import family_of
 
-__all__ = ["address_of", "all_listed", "families_in", "is_listed", "is_own", "listed_at", "registers", "rows_of"]
+__all__ = ["address_of", "all_listed", "families_in", "listed_at", "registers", "rows_of"]
 
 
 def address_of(profile: Profile) -> int | None:
@@ -44,16 +44,6 @@ def listed_at(address: int, word: int) -> list[IdentificationCode]:
 def rows_of(native: Iterable[dict[str, Any]]) -> list[IdentificationCode]:
     """Rows as the core has them."""
     return [IdentificationCode(**{**row, "shared": tuple(row["shared"])}) for row in native]
-
-
-def is_own(profile: Profile, address: int, word: int) -> bool:
-    """Whether *word* at *address* is a code of a family that units of *profile* report as."""
-    return family_of(profile).is_own(address, word)
-
-
-def is_listed(profile: Profile) -> bool:
-    """Whether *profile* or a shipped one lists a code of the family of *profile*."""
-    return family_of(profile).is_listed
 
 
 def families_in(rows: Iterable[IdentificationCode]) -> list[str]:

@@ -1,14 +1,13 @@
-"""Whether what a unit says of itself speaks against the profile that it was named with.
+"""Whether what a unit says of itself speaks against the profile that it was named with, in words.
 
-A profile is named by people, and people mistake one drive for another. What speaks against one is only what documents
-or other programs say of another family: a code that is listed for that, or a word that units of the named one always
-have, refused as an address that there is none. An unknown code tells nothing, for firmwares differ; nor does a locked
-drive, nor a silent one.
+A profile is named by people, and people mistake one drive for another. What speaks against one is decided in the core
+(`crates/drive`): only what documents or other programs say of another family.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 from drivebus import tables
 from drivebus.advice import Advice, Text, argument
@@ -19,36 +18,27 @@ from drivebus.profile import Profile, profiles
 from drivebus.profile.facts import IdentificationCode
 from drivebus.profile.family import family_of
 
-__all__ = ["contradiction", "is_suspicious", "other_signature"]
+__all__ = ["contradiction", "in_words"]
 
 
 def contradiction(profile: Profile, unit: int, answers: Sequence[Answer]) -> str | None:
     """What among *answers* speaks against *profile*, and what to do about it; None if nothing does."""
     against = family_of(profile).contradiction(answers)
-    if against is None:
-        return None
-    kind, place, said, rows = against
+    return None if against is None else in_words(profile, unit, against)
+
+
+def in_words(profile: Profile, unit: int, against: tuple[str, Any]) -> Text:
+    """What speaks *against* a *unit* of *profile*, as the core has it, and what to do about it."""
+    kind, told = against
     if kind == "code":
-        return _told(profile, unit, _by_code(profile, unit, said, codes.rows_of(rows)))
-    return _told(profile, unit, _by_refusal(unit, kind, place, said))
-
-
-def is_suspicious(profile: Profile, answers: Sequence[Answer]) -> bool:
-    """Whether a unit of *profile* would hardly give these *answers*, so that it is worth asking what else it may be.
-
-    It is not what speaks against the profile: firmwares differ, and so do editions of manuals.
-    """
-    return family_of(profile).is_suspicious(answers)
-
-
-def other_signature(profile: Profile, unit: int, shown: Iterable[str]) -> str | None:
-    """What speaks against *profile* if a unit answers and refuses what those of the families *shown* do."""
-    names = list(shown)
-    if not names or set(names) & set(profile.reports_as()):
-        return None
-    titles = [f"{Profile.builtin(name).title} ({name})" for name in names]
-    then = asked_as(unit, names)
-    return _told(profile, unit, f"it answers and refuses what a {one_of(titles)} does: ask for it as that: ", then)
+        _, code, rows = told
+        return _told(profile, unit, _by_code(profile, unit, code, codes.rows_of(rows)))
+    if kind == "signature":
+        titles = [f"{Profile.builtin(name).title} ({name})" for name in told]
+        then = asked_as(unit, told)
+        return _told(profile, unit, f"it answers and refuses what a {one_of(titles)} does: ask for it as that: ", then)
+    place, exception = told
+    return _told(profile, unit, _by_refusal(unit, kind, place, exception))
 
 
 def _told(profile: Profile, unit: int, *against: str) -> Text:

@@ -41,7 +41,7 @@ async def profile_of(
         if found.certainty == "by answers":
             # The whole signature of that family and of no other: a halt need not ask for it again.
             said = units_of(getattr(bus, "line", bus)).record(unit).identity(known, connection)
-            said.is_sure, said.heard = True, bus.now()
+            said.settle(connection, bus.now())
     else:
         known = Profile.find(profile)
     return known if variants is None else known.with_variants(variants), code

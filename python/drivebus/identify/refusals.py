@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from drivebus import _native, tables
+from drivebus import tables
 from drivebus.errors import BadAnswer, Refused
 from drivebus.line.asking import Ask, Read
-from drivebus.profile import Profile
-from drivebus.profile.family import family_of
 
 __all__ = [
     "LOCKED",
@@ -17,8 +15,6 @@ __all__ = [
     "answer_at",
     "answer_once",
     "busy",
-    "passes",
-    "tells_nothing",
 ]
 
 _NO_FUNCTION = 0x01
@@ -43,16 +39,6 @@ class Answer(NamedTuple):
     address: int
     word: int | None
     exception: int | None
-
-
-def passes(answer: Answer) -> bool:
-    """Whether *answer* is a refusal that passes, whatever the unit is."""
-    return _native.passes(answer)
-
-
-def tells_nothing(profile: Profile, answer: Answer) -> bool:
-    """Whether *answer* is a refusal that passes, and so tells nothing of a unit of *profile*."""
-    return family_of(profile).is_put_off_by(answer)
 
 
 async def answer_once(ask: Ask, unit: int, place: int) -> Answer:

@@ -12,36 +12,14 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from weakref import WeakKeyDictionary
 
+from drivebus._native import Identity
 from drivebus.line.addresses import Addresses
 from drivebus.line.write_guard import check_words, prepare_guard
 from drivebus.profile import Profile
 from drivebus.rtu import written
 from drivebus.values import State
 
-__all__ = ["Identity", "UnitRecord", "Units", "belongs", "units_of"]
-
-
-@dataclass(slots=True)
-class Identity:
-    """What a unit said of itself, asked in the words of one profile.
-
-    Attributes:
-        connection: The `reconnects` of the line when that was heard.
-        known: Its answers, as they are compared with later ones; None while it has not told all of them.
-        heard: When it answered last, on the line's clock; None if nobody noted that.
-        spoke: Whether they tell anything: that it refuses whatever it is asked, any unit may say.
-        contradicts: Whether they speak against the profile.
-        is_sure: Whether they leave no other family that one of its halts could start.
-        harmless: The places that no family which it may be keeps words of, or starts by.
-    """
-
-    connection: int
-    known: str | None = None
-    heard: float | None = None
-    spoke: bool = False
-    contradicts: bool = False
-    is_sure: bool = False
-    harmless: set[int] = field(default_factory=set)
+__all__ = ["UnitRecord", "Units", "belongs", "units_of"]
 
 
 @dataclass(slots=True, eq=False)
