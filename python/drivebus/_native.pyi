@@ -19,8 +19,9 @@ _Writable: TypeAlias = tuple[str, int, list[int] | None, str, int | None, str, i
 
 __version__: Final[str]
 __all__ = [
+    "ANSWER_WITHIN",
     "HALTS",
-    "Apart",
+    "Aim",
     "Asked",
     "Batch",
     "Bus",
@@ -42,7 +43,9 @@ __all__ = [
     "Sniffer",
     "Task",
     "__version__",
+    "all_frames_in",
     "begin_of_child",
+    "check_harmless",
     "check_port_options",
     "code_places",
     "code_rows",
@@ -59,10 +62,13 @@ __all__ = [
     "forbidden",
     "frame_len",
     "frames_in",
+    "goes_out_at_once",
+    "huanyang_form",
     "identify",
     "is_write",
     "judge",
     "listed_codes",
+    "may_be_of",
     "misses",
     "only_reads",
     "open_bus",
@@ -73,6 +79,9 @@ __all__ = [
     "touched",
     "usable",
 ]
+
+ANSWER_WITHIN: Final[float]
+"""Seconds that a unit is given to answer what is asked before a halt, and the halt itself."""
 
 HALTS: Final[tuple[str, str, str]]
 """The commands that end a motion, in the order of who else may stand in for one that a family lacks."""
@@ -156,6 +165,15 @@ def frames_in(data: Buffer, /) -> list[tuple[int, int]]:
 
     Those with a length that their function gives, a good CRC, and nothing wrong inside.
     """
+
+def all_frames_in(data: Buffer, /) -> list[tuple[int, int]]:
+    """The same, and between them those that are surely of Huanyang's own protocol."""
+
+def huanyang_form(data: Buffer, /) -> tuple[bool, bool]:
+    """Whether *data* is a whole frame of Huanyang's own protocol, and whether it is surely none of Modbus."""
+
+def may_be_of(unit: int, data: Buffer, /) -> bool:
+    """Whether *data*, which came where *unit* was asked, may hold an answer of it, whole or damaged."""
 
 def port_facts(
     path: str | os.PathLike[str],
@@ -532,36 +550,13 @@ class Family:
     """
 
     def __new__(cls, profile: Profile, /) -> Family: ...
-    def halt_for(self, command: str, /) -> str | None:
-        """The command by which its units do what *command* is for; None where they have none that halts."""
     def harmed(self, what: str | int, /) -> list[str]:
         """The shipped families that *what* does harm to where it is written to a unit named as one of this family."""
-    def is_harmed_by(self, what: str | int, named: Family, /) -> bool:
-        """Whether *what*, written to a unit that was named as one of *named*, does harm to one of this family."""
     def contradiction(self, answers: Sequence[_Answer], /) -> tuple[str, Any] | None:
         """What speaks against it.
 
         `"code"`: the place, the word, and the rows that are listed of it. `"no_address"` and `"no_function"`: the
         place, and the exception. `"signature"`: the families whose signature the unit has, of a `SameUnit` alone.
-        """
-
-@final
-class Apart:
-    """The families that one unit may be, told apart by its answers, which are as for `Family`."""
-
-    def __new__(cls, named: Family, trusted: bool, /) -> Apart: ...
-    @property
-    def is_asked(self) -> bool:
-        """Whether the unit told anything yet."""
-    @property
-    def shows_named(self) -> bool:
-        """Whether the answers show a unit of what it was named as, and nothing speaks against that."""
-    def heard(self, answer: _Answer, /) -> bool:
-        """Takes *answer* into account. Whether it tells anything."""
-    def verdict(self, what: str | int, /) -> tuple[int | None, str | None, list[str]]:
-        """The place to ask; else the family to take the unit for; else those that it may be, which may be none.
-
-        NotAllowed: there is no such place or command.
         """
 
 @final
@@ -575,12 +570,6 @@ class Identity:
     @property
     def connection(self) -> int:
         """The one over which it was heard."""
-    def is_sure(self, connection: int, /) -> bool:
-        """Whether it said, over this connection, what no family says that its halts could start."""
-    def is_harmless(self, place: int, connection: int, /) -> bool:
-        """Whether a word at *place* was found to do no harm to it, over this connection."""
-    def found_harmless(self, place: int, connection: int, /) -> None:
-        """A word at *place* does it no harm, for as long as the port stays open."""
     def is_known(self, connection: int, /) -> bool:
         """Whether it said all that it is asked, over this connection, and nothing against its name."""
     def is_old(self, now: float, /) -> bool:
@@ -606,6 +595,32 @@ class SameUnit:
         """
     def contradiction(self, urgent: bool, /) -> Task:
         """Asks the unit what it is. Its result is what speaks against the family, or None."""
+
+@final
+class Aim:
+    """The look at one unit that comes before a halt."""
+
+    def __new__(cls, unit: SameUnit, now: float, /) -> Aim: ...
+    @property
+    def heard(self) -> float:
+        """The line's clock when the unit last answered what it was asked, or may have."""
+    def doubt(self) -> bool:
+        """Puts in doubt what it was halted as. False if it was."""
+    def take(self, command: str, /) -> Task:
+        """As what to halt the unit.
+
+        Its result is `"target"`, the name of the family and the command of that; `"unsaid"` where it did not say yet;
+        or `"may_be"` and the families that it may be, which may be none. NotAllowed: there is no such command.
+        """
+
+def goes_out_at_once(unit: SameUnit, what: str | int, connection: int, /) -> bool:
+    """Whether nothing is asked before *what*, as for `Family`, is sent."""
+
+def check_harmless(unit: SameUnit, what: str | int, /) -> Task:
+    """Makes sure that *what*, as for `Family`, does no harm to the unit.
+
+    Its result is `"harmless"`; `"may_be"` as of `Aim.take`; or `"busy"` as of `identify`.
+    """
 
 def identify(unit: int, /) -> Task:
     """Finds out what *unit* is, by reads of one word each.

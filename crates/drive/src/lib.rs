@@ -31,6 +31,8 @@
 //!
 //! A drive that was told to stop says "running" until its motor stands. [`Fall`] takes what is seen of that meanwhile, and
 //! knows whether it proves that the motor obeys.
+//! [`Families`] knows whom a word would harm, and [`Apart`] which few words to ask a unit for before it is sent. What takes
+//! several questions is an operation, driven by hand as a [`Task`](task::Task): [`identify()`], [`SameUnit`] and [`Aim`].
 //!
 //! # Rooms
 //!
@@ -49,10 +51,13 @@
 //! | `signatures` | whose signature a unit shows |
 //! | `identify` | what a unit of which nothing is known is |
 //! | `same_unit` | whether a unit is what it was named as, and still the one it was |
+//! | `huanyang` | frames of another protocol on the same wires, and what may be an answer |
+//! | `aim` | as what a unit is halted, and whether a word may be sent to it |
 //! | `task` | operations that wait for a line, and how they are driven without one |
 
 #![forbid(unsafe_code)]
 
+mod aim;
 mod answer;
 mod apart;
 mod asked;
@@ -63,6 +68,7 @@ mod families;
 mod family;
 mod guard;
 mod harm;
+pub mod huanyang;
 mod identify;
 mod rule;
 mod same_unit;
@@ -71,6 +77,7 @@ mod scripted;
 mod signatures;
 pub mod task;
 
+pub use aim::{ANSWER_WITHIN, Aim, NotTaken, Target, check_harmless, goes_out_at_once};
 pub use answer::{Answer, Said, meanings};
 pub use apart::{Apart, Verdict};
 pub use asked::{NotTold, answer_at, answer_once};

@@ -1,5 +1,6 @@
 //! Frames without a line: encode, judge, take apart, and the CRC.
 
+use drivebus_drive::huanyang;
 use drivebus_rtu::{
     Adu, Answer, AnswerLength, Destination, Frame, Request, Table, Touched, UnitAddress, crc16 as crc,
     frame_len as len_of, function,
@@ -7,7 +8,7 @@ use drivebus_rtu::{
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
-use crate::convert::{bytes_of, destination, one_word, unit_address, words_of};
+use crate::convert::{any_unit, bytes_of, destination, one_word, unit_address, words_of};
 use crate::errors::{answer_error, frame_error, refuse, refused};
 
 /// CRC-16/MODBUS of any bytes-like object. By position only, as `zlib.crc32`: a name costs a fifth of the call.
@@ -227,4 +228,27 @@ pub(crate) fn misses(request: &Bound<'_, PyAny>, frame: &Bound<'_, PyAny>) -> Py
 pub(crate) fn frames_in(data: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, usize)>> {
     let bytes = bytes_of(data)?;
     Ok(drivebus_rtu::frames_in(bytes.as_bytes()).map(|range| (range.start, range.end)).collect())
+}
+
+/// The same, and those that are surely of Huanyang's own protocol.
+#[pyfunction]
+#[pyo3(signature = (data, /))]
+pub(crate) fn all_frames_in(data: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, usize)>> {
+    let bytes = bytes_of(data)?;
+    Ok(huanyang::frames_in(bytes.as_bytes()).into_iter().map(|range| (range.start, range.end)).collect())
+}
+
+/// Whether `data` is a whole frame of Huanyang's own protocol, and whether it is surely none of Modbus.
+#[pyfunction]
+#[pyo3(signature = (data, /))]
+pub(crate) fn huanyang_form(data: &Bound<'_, PyAny>) -> PyResult<(bool, bool)> {
+    let bytes = bytes_of(data)?;
+    Ok((huanyang::has_form(bytes.as_bytes()), huanyang::is_sure(bytes.as_bytes())))
+}
+
+/// Whether `data`, which came where `unit` was asked, may hold an answer of it.
+#[pyfunction]
+#[pyo3(signature = (unit, data, /))]
+pub(crate) fn may_be_of(unit: &Bound<'_, PyAny>, data: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(huanyang::may_be_of(any_unit(unit)?, bytes_of(data)?.as_bytes()))
 }

@@ -7,7 +7,7 @@ use drivebus_drive::{self as drive, Families, Forbidden};
 use drivebus_drives::Place;
 use pyo3::prelude::*;
 
-use crate::apart::Family;
+use crate::family::Family;
 use crate::convert::{place_of, words_of};
 use crate::errors::bad_argument;
 
@@ -28,7 +28,7 @@ pub(crate) fn forbidden(
     place: &Bound<'_, PyAny>,
     words: &Bound<'_, PyAny>,
 ) -> PyResult<Option<Told>> {
-    let unit: Vec<_> = families.into_iter().map(|family| family.get().core()).collect();
+    let unit: Vec<_> = families.into_iter().map(|family| Arc::clone(family.get().core())).collect();
     let words = words_of(words)?;
     let words = words.as_ref().map_or_else(std::slice::from_ref, Vec::as_slice);
     let Err(why) = Families::shipped().check(&unit, place_of(place)?, words) else {

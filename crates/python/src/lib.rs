@@ -5,7 +5,7 @@
 
 use pyo3::prelude::*;
 
-mod apart;
+mod aim;
 mod arguments;
 mod attendant;
 mod bus;
@@ -14,6 +14,7 @@ mod convert;
 mod ending;
 mod errors;
 mod fall;
+mod family;
 mod format;
 mod frames;
 mod gateway;
@@ -45,7 +46,7 @@ mod _native {
     use pyo3::types::PyTuple;
 
     #[pymodule_export]
-    use crate::apart::{Apart, Family, code_places, code_rows, listed_codes};
+    use crate::aim::{Aim, check_harmless, goes_out_at_once};
     #[pymodule_export]
     use crate::bus::Bus;
     #[pymodule_export]
@@ -53,16 +54,19 @@ mod _native {
     #[pymodule_export]
     use crate::fall::Fall;
     #[pymodule_export]
+    use crate::family::{Family, code_places, code_rows, listed_codes};
+    #[pymodule_export]
     use crate::format::SerialFormat;
     #[pymodule_export]
     use crate::frames::{
-        crc16, decode, decode_answer, encode_echo, encode_read, encode_write, frame_len, frames_in, is_write, judge,
-        misses, only_reads, touched,
+        all_frames_in, crc16, decode, decode_answer, encode_echo, encode_read, encode_write, frame_len, frames_in,
+        huanyang_form, is_write, judge, may_be_of, misses, only_reads, touched,
     };
     #[pymodule_export]
     use crate::gateway::Gateway;
     #[pymodule_export]
     use crate::guard::{commanded_at, forbidden};
+    #[pymodule_export]
     use crate::identify::{identify, usable};
     #[pymodule_export]
     use crate::mailbox::Mailbox;
@@ -93,7 +97,8 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        module.add("HALTS", PyTuple::new(module.py(), crate::apart::halts())?)?;
+        module.add("HALTS", PyTuple::new(module.py(), crate::family::halts())?)?;
+        module.add("ANSWER_WITHIN", drivebus_drive::ANSWER_WITHIN.as_secs_f64())?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

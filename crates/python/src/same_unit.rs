@@ -5,9 +5,9 @@ use std::sync::Arc;
 use drivebus_drive::{self as drive, Contradiction, Families, NotSame};
 use pyo3::prelude::*;
 
-use crate::apart::{Family, against};
 use crate::clock::moment;
-use crate::convert::{any_unit, place_of};
+use crate::convert::any_unit;
+use crate::family::{Family, against};
 use crate::task::{Failed, Task, unknown};
 
 /// What a unit said of itself, asked in the words of one family.
@@ -26,22 +26,6 @@ impl Identity {
     #[getter]
     fn connection(&self) -> u64 {
         self.0.connection()
-    }
-
-    #[pyo3(signature = (connection, /))]
-    fn is_sure(&self, connection: u64) -> bool {
-        self.0.is_sure(connection)
-    }
-
-    #[pyo3(signature = (place, connection, /))]
-    fn is_harmless(&self, place: &Bound<'_, PyAny>, connection: u64) -> PyResult<bool> {
-        Ok(self.0.is_harmless(place_of(place)?, connection))
-    }
-
-    #[pyo3(signature = (place, connection, /))]
-    fn found_harmless(&self, place: &Bound<'_, PyAny>, connection: u64) -> PyResult<()> {
-        self.0.found_harmless(place_of(place)?, connection);
-        Ok(())
     }
 
     #[pyo3(signature = (connection, /))]

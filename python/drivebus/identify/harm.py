@@ -13,29 +13,10 @@ from drivebus._native import HALTS
 from drivebus.profile import Profile
 from drivebus.profile.family import family_of
 
-__all__ = ["HALTS", "halt_of", "harmed", "harms"]
-
-
-def halt_of(profile: Profile, command: str) -> str | None:
-    """The command by which units of *profile* do what *command* is for; None where they have none that halts.
-
-    A family without a jog stop ends a jog by its stop, and one without a coast only has its stop.
-    """
-    return family_of(profile).halt_for(command)
+__all__ = ["HALTS", "harmed"]
 
 
 @functools.lru_cache(maxsize=4096)
 def harmed(named: Profile, what: str | int) -> tuple[Profile, ...]:
     """The families that *what* is written to a unit of *named* would do harm to; none where it has no such command."""
     return tuple(map(Profile.builtin, family_of(named).harmed(what)))
-
-
-def harms(profile: Profile, named: Profile, what: str | int) -> bool:
-    """Whether *what* is written to a unit of *named* does harm to one of *profile*.
-
-    Args:
-        profile: The family that the unit may be of.
-        named: The family that it was named as.
-        what: A command of *named*, or a place that any word may be written to.
-    """
-    return family_of(profile).is_harmed_by(what, family_of(named))

@@ -17,7 +17,7 @@ from drivebus import _native
 from drivebus.advice import Text
 from drivebus.errors import WrongDrive
 from drivebus.identify.contradiction import in_words
-from drivebus.identify.family import family_of
+from drivebus.profile.family import family_of
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.tasks import carried_out
 from drivebus.line.units import UnitRecord
@@ -60,28 +60,12 @@ class SameUnit:
         """The same for the core, where its words are known better: by *profile*."""
         return _native.SameUnit(self._unit, family_of(profile), self._identity, self.trusted)
 
-    def is_sure(self, bus: AwaitableBus) -> bool:
-        """Whether it said, over the connection that *bus* has now, what no family says that its halts could start."""
-        return self._identity.is_sure(bus.reconnects)
-
     def is_known(self, bus: AwaitableBus) -> bool:
         """Whether it said all that it is asked, over the connection that *bus* has, and nothing against its name.
 
         One that refused all that said nothing: any unit may.
         """
         return self._identity.is_known(bus.reconnects)
-
-    def is_harmless(self, bus: AwaitableBus, place: int) -> bool:
-        """Whether a word at *place* was found to do no harm to it, over the connection that *bus* has."""
-        return self._identity.is_harmless(place, bus.reconnects)
-
-    def found_harmless(self, bus: AwaitableBus, place: int) -> None:
-        """A word at *place* does it no harm, for as long as the port stays open: by what it answered."""
-        self._identity.found_harmless(place, bus.reconnects)
-
-    def settle(self, bus: AwaitableBus) -> None:
-        """Takes it for surely what it was named as, for as long as the port stays open: by what else it answered."""
-        self._identity.settle(bus.reconnects, bus.now())
 
     def is_old(self, bus: AwaitableBus) -> bool:
         """Whether what it said of itself was said so long ago that another drive may have taken its place unseen."""

@@ -10,11 +10,7 @@ __all__ = ["frames_in", "in_words", "may_be_of"]
 
 def frames_in(data: bytes) -> list[bytes]:
     """The whole frames in *data*, of Modbus or of Huanyang's own protocol, whatever stands between them."""
-    frames, at = [], 0
-    for start, end in _native.frames_in(data):
-        frames += [*huanyang.sure_in(data[at:start]), data[start:end]]
-        at = end
-    return [*frames, *huanyang.sure_in(data[at:])]
+    return [data[start:end] for start, end in _native.all_frames_in(data)]
 
 
 def may_be_of(unit: int, data: bytes) -> bool:
@@ -22,8 +18,7 @@ def may_be_of(unit: int, data: bytes) -> bool:
 
     Noise, and what others say, does not: then the unit was as silent as if nothing had come.
     """
-    frames = frames_in(data)
-    return any(frame[0] == unit for frame in frames) or (not frames and unit in data[:-1])
+    return _native.may_be_of(unit, data)
 
 
 def in_words(frame: bytes) -> str:

@@ -1,7 +1,8 @@
-"""Huanyang's own protocol, on the same wires and with the same CRC as Modbus, and none: what its frames look like.
+"""Huanyang's own protocol, on the same wires and with the same CRC as Modbus, and none: what its frames mean.
 
 A frame is the unit, a function (01 to 06), how many bytes of data follow, those, and the CRC; request and answer look
-alike. After LinuxCNC, src/hal/user_comps/huanyang-vfd/hy_modbus.c (functions, lengths and data):
+alike. What is one is decided in the core (`crates/drive`). After LinuxCNC,
+src/hal/user_comps/huanyang-vfd/hy_modbus.c (functions, lengths and data):
 
 | function | bytes of data | what |
 | --- | --- | --- |
@@ -19,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivebus._native import crc16
+from drivebus._native import huanyang_form
 
 __all__ = ["NAME", "REMARK", "STATUS_READ", "belong", "frames_in", "has_form", "is_sure", "tells_status", "words"]
 
@@ -30,7 +31,6 @@ STATUS_READ = bytes((0x04, 0x03, 0x00, 0x00, 0x00))
 """Asks a unit for its status 0, the set frequency. A unit that speaks Modbus is asked by it for no input register, and
 refuses."""
 
-_LENGTHS = {1: (2, 3), 2: (2, 3), 3: (1,), 4: (1, 3), 5: (2,), 6: (1, 2, 3)}
 _CONTROL = {0x01: "run forward", 0x11: "run in reverse", 0x08: "stop"}
 _STATUS = (
     "set frequency",
@@ -42,33 +42,16 @@ _STATUS = (
     "counter",
     "temperature",
 )
-_MOST_WORDS = 125
-"""Of one read of Modbus."""
 
 
 def has_form(data: bytes) -> bool:
     """Whether *data* is a whole frame of this protocol; some of those are frames of Modbus, too."""
-    return (
-        6 <= len(data) <= 8
-        and data[2] in _LENGTHS.get(data[1], ())
-        and len(data) == 5 + data[2]
-        and crc16(data[:-2]) == int.from_bytes(data[-2:], "little")
-    )
+    return huanyang_form(data)[0]
 
 
 def is_sure(data: bytes) -> bool:
     """Whether *data* is a frame of this protocol, and none that Modbus has, whoever sent it."""
-    if not has_form(data):
-        return False
-    function, count = data[1], data[2]
-    if function == 3 or (function == 4 and count == 1):
-        # One byte is no word, and no read is as short.
-        return True
-    if function == 4:
-        # No words have three bytes; as a read it asks for none, or for more than there may be.
-        return not 1 <= int.from_bytes(data[4:6], "big") <= _MOST_WORDS
-    # A single write has eight bytes. What reads or writes a parameter may be bits of Modbus.
-    return function == 5 or (function == 6 and count != 3)
+    return huanyang_form(data)[1]
 
 
 def belong(request: bytes, answer: bytes) -> bool:
@@ -92,18 +75,6 @@ def frames_in(data: bytes) -> list[bytes] | None:
         frames.append(frame)
         at += len(frame)
     return frames or None
-
-
-def sure_in(data: bytes) -> Iterator[bytes]:
-    """The frames in *data* that are sure to be of this protocol, whatever stands between them."""
-    at = 0
-    while at + 2 < len(data):
-        frame = data[at : at + 5 + data[at + 2]]
-        if is_sure(frame):
-            yield frame
-            at += len(frame)
-        else:
-            at += 1
 
 
 def words(frame: bytes, sent: bool) -> str:

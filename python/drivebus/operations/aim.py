@@ -1,33 +1,31 @@
 """As what a unit is halted: by the command of its name, or where it may be another drive by that of what it shows.
 
 The code that stops one family starts another. A unit that this line has identified is taken for what it is. Of any
-other a few words are asked first, before everything that waits for the line, and none of them again: `identify.apart`
-says which, and what they tell. A unit that says nothing at all is taken for what it was named as, since silence is no
-evidence; what it is is then asked behind the halt.
+other a few words are asked first, before everything that waits for the line, and none of them again. A unit that
+says nothing at all is taken for what it was named as, since silence is no evidence; what it is is then asked behind the
+halt.
+
+What is asked, and as what the unit is taken, is decided in the core (`crates/drive`); here are the words for it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
+from drivebus import _native
 from drivebus.advice import Text, argument
-from drivebus.errors import LINE_ERRORS, BadAnswer, NoAnswer, NotAllowed, WrongDrive
-from drivebus.identify.apart import Apart
+from drivebus.errors import LINE_ERRORS, NotAllowed, WrongDrive
 from drivebus.identify.families import asked_as, one_of
-from drivebus.identify.harm import halt_of, harmed, harms
-from drivebus.identify.refusals import answer_at, answer_once
-from drivebus.line.asking import asking
-from drivebus.line.frames import may_be_of
+from drivebus.identify.refusals import busy
+from drivebus.line.tasks import carried_out
 from drivebus.operations.drive_view import DriveView
-from drivebus.profile import Profile, profiles
+from drivebus.profile import Profile
 
 __all__ = ["ANSWER_WITHIN", "Aim", "Target", "check_harmless", "goes_out_at_once"]
 
-ANSWER_WITHIN = 0.1
+ANSWER_WITHIN = _native.ANSWER_WITHIN
 """Seconds that a unit is given to answer what is asked before a halt, and the halt itself."""
-
-_QUESTIONS = 24
-"""Most questions about one unit; the longest way through the shipped families takes 15."""
 
 
 class Target(NamedTuple):
@@ -47,23 +45,20 @@ class Aim:
 
     Args:
         unit: The unit, as it was named.
-
-    Attributes:
-        heard: The line's clock when the unit last answered what it was asked, or may have.
     """
 
     def __init__(self, unit: DriveView) -> None:
-        self.heard = unit.bus.now()
         self._unit = unit
-        self._apart = Apart(unit.profile, trusted=unit.identity.trusted)
-        self._doubted = False
+        self._aim = _native.Aim(_seen(unit), unit.bus.now())
+
+    @property
+    def heard(self) -> float:
+        """The line's clock when the unit last answered what it was asked, or may have."""
+        return self._aim.heard
 
     def doubt(self) -> bool:
         """Puts in doubt what it was halted as: what it says now decides, and silence says nothing. False if it was."""
-        if self._doubted:
-            return False
-        self._apart, self._doubted = Apart(self._unit.profile, trusted=self._unit.identity.trusted), True
-        return True
+        return self._aim.doubt()
 
     async def take(self, command: str) -> Target | None:
         """As what to halt the unit by *command*, or None where it did not say yet.
@@ -73,40 +68,14 @@ class Aim:
             PortError: The port is lost.
         """
         unit = self._unit
-        if not self._doubted and goes_out_at_once(unit, command):
-            return Target(unit, command)
-        ask = asking(unit.bus, urgent=True, timeout=ANSWER_WITHIN, retries=0)
-        for _ in range(_QUESTIONS):
-            verdict = self._apart.verdict(command)
-            if verdict.take is not None:
-                return self._as(verdict.take, command)
-            if verdict.ask is None:
-                raise _undecided(unit, command, verdict.others)
-            try:
-                answer = await answer_once(ask, unit.address, verdict.ask)
-            except (NoAnswer, BadAnswer) as error:
-                if may_be_of(unit.address, error.raw):
-                    self.heard = unit.bus.now()
-                    return None
-                # Silence is no evidence. Where it spoke before, the line lost this one.
-                return None if self._apart.is_asked or self._doubted else Target(unit, command)
-            self.heard = unit.bus.now()
-            if not self._apart.heard(answer):
-                return None
-        raise _undecided(unit, command, ())
-
-    def _as(self, profile: Profile, command: str) -> Target:
-        """The unit as one of *profile*."""
-        unit = self._unit
-        if profile is unit.profile:
-            if self._apart.shows_named:
-                unit.identity.settle(unit.bus)
-            return Target(unit, command)
-        halt = halt_of(profile, command)
-        if halt is None:
-            raise _undecided(unit, command, (profile,))
+        kind, told = await carried_out(self._aim.take(command), unit.bus)
+        if kind == "unsaid":
+            return None
+        if kind == "may_be":
+            raise _undecided(unit, command, _profiles(unit, told))
+        [profile] = _profiles(unit, told[:1])
         # That its own papers are thin is no reason to let it run: nothing else halts what shows this family.
-        return Target(unit.taken_for(profile), halt)
+        return Target(unit if profile is unit.profile else unit.taken_for(profile), told[1])
 
 
 def goes_out_at_once(unit: DriveView, what: str | int) -> bool:
@@ -119,13 +88,7 @@ def goes_out_at_once(unit: DriveView, what: str | int) -> bool:
         unit: The unit, as it was named.
         what: A command, or a place that any word may be written to.
     """
-    identity, bus = unit.identity, unit.bus
-    if identity.is_sure(bus):
-        return True
-    if isinstance(what, int) and (identity.trusted or identity.is_harmless(bus, what)):
-        return True
-    is_known = identity.is_known(bus) and not identity.trusted and unit.profile.family in profiles()
-    return is_known or not harmed(unit.profile, what)
+    return _native.goes_out_at_once(_seen(unit), what, unit.bus.reconnects)
 
 
 async def check_harmless(unit: DriveView, what: str | int) -> None:
@@ -141,33 +104,28 @@ async def check_harmless(unit: DriveView, what: str | int) -> None:
         NotAllowed: It shows such a family, or may be one. Nothing was written.
         NoAnswer, BadAnswer, PortError: The line failed, or the unit is busy; nothing was written.
     """
-    if goes_out_at_once(unit, what):
-        return
-    apart = Apart(unit.profile, trusted=unit.identity.trusted)
-    for _ in range(_QUESTIONS):
-        verdict = apart.verdict(what)
-        if verdict.ask is None:
-            taken = verdict.take
-            if taken is None or (taken is not unit.profile and harms(taken, unit.profile, what)):
-                raise _another(unit, verdict.others if taken is None else (taken,))
-            if isinstance(what, int):
-                # Whoever would take harm from some word there, would from none that halts.
-                if apart.shows_named and unit.profile.is_command(what):
-                    unit.identity.settle(unit.bus)
-                unit.identity.found_harmless(unit.bus, what)
-            return
-        try:
-            answer = await answer_at(unit.bus.ask, unit.address, verdict.ask)
-        except LINE_ERRORS as error:
-            # `started` stays None: of what was to follow, nothing left.
-            raise type(error)(
-                f"unit {unit.address} does not say what it is ({error}); nothing was written to it",
-                unit=unit.address,
-                raw=error.raw,
-            ) from error
-        if not apart.heard(answer):
-            break
-    raise _another(unit, ())
+    try:
+        kind, told = await carried_out(_native.check_harmless(_seen(unit), what), unit.bus)
+        if kind == "busy":
+            raise busy(unit.address, *told) from told[-1]
+    except LINE_ERRORS as error:
+        # `started` stays None: of what was to follow, nothing left.
+        raise type(error)(
+            f"unit {unit.address} does not say what it is ({error}); nothing was written to it",
+            unit=unit.address,
+            raw=error.raw,
+        ) from error
+    if kind == "may_be":
+        raise _another(unit, _profiles(unit, told))
+
+
+def _seen(unit: DriveView) -> _native.SameUnit:
+    return unit.identity.seen_as(unit.profile)
+
+
+def _profiles(unit: DriveView, names: Iterable[str]) -> tuple[Profile, ...]:
+    """The families of *names*: of a name that it shares with a shipped one, the named one is the one that is meant."""
+    return tuple(unit.profile if name == unit.profile.name else Profile.builtin(name) for name in names)
 
 
 def _undecided(unit: DriveView, command: str, others: tuple[Profile, ...]) -> NotAllowed:

@@ -3,6 +3,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 
 use super::*;
+use crate::harm::What;
 use crate::scripted::{Fault, Reply, Script, UNIT, any_family, any_reply, fails, like, refuses, shipped};
 use crate::task::Cause;
 
@@ -236,8 +237,8 @@ proptest! {
             }
             prop_assert!(named.script.asked.len() <= 200);
             prop_assert!(named.is_known() || !named.is_sure());
-            let identity = named.same.identity();
-            prop_assert!(!identity.is_known(u64::MAX) && !identity.is_sure(u64::MAX), "over another connection");
+            let at_once = crate::goes_out_at_once(&named.same, Families::shipped(), What::Word(0x2000.into()), u64::MAX);
+            prop_assert!(is_trusted || !at_once, "over another connection nothing is known");
         }
     }
 }

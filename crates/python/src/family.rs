@@ -1,8 +1,8 @@
-//! `Family` and `Apart` for Python: what a unit may be, by what it answers, and whom a word would harm.
+//! `Family` for Python: what speaks against one by what a unit answers, and whom a word would harm.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
-use drivebus_drive::{self as drive, Answer, Contradiction, Families, HALTS, Said, Verdict, What};
+use drivebus_drive::{self as drive, Answer, Contradiction, Families, HALTS, Said, What};
 use drivebus_drives::{Command, Place};
 use drivebus_rtu::ExceptionCode;
 use pyo3::prelude::*;
@@ -29,9 +29,6 @@ impl<'py> FromPyObject<'_, 'py> for Heard {
     }
 }
 
-/// What to ask, as what to take the unit, and else what it may be, each by its name.
-type Told = (Option<u32>, Option<String>, Vec<String>);
-
 /// What speaks against a family: of which kind, and what of it Python words.
 type Against<'py> = (&'static str, Bound<'py, PyAny>);
 
@@ -54,72 +51,14 @@ impl Family {
         Self(Families::shipped().family(&profile.core()))
     }
 
-    #[pyo3(signature = (command, /))]
-    fn halt_for(&self, command: &str) -> PyResult<Option<&'static str>> {
-        let command: Command = command.parse().map_err(refuse)?;
-        Ok(self.0.halt_for(command).map(Command::name))
-    }
-
     #[pyo3(signature = (what, /))]
     fn harmed(&self, what: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
         Ok(names(&Families::shipped().harmed(what_of(what)?, &self.0)))
     }
 
-    #[pyo3(signature = (what, named, /))]
-    fn is_harmed_by(&self, what: &Bound<'_, PyAny>, named: &Self) -> PyResult<bool> {
-        Ok(self.0.is_harmed_by(what_of(what)?, &named.0))
-    }
-
     #[pyo3(signature = (answers, /))]
     fn contradiction<'py>(&self, py: Python<'py>, answers: Vec<Heard>) -> PyResult<Option<Against<'py>>> {
         self.0.contradiction(&all(answers)).map(|found| against(py, found)).transpose()
-    }
-}
-
-/// The families that one unit may be, told apart by its answers.
-#[pyclass(name = "Apart", frozen, module = "drivebus._native")]
-#[derive(Debug)]
-pub(crate) struct Apart(Mutex<drive::Apart>);
-
-impl Apart {
-    fn with<T>(&self, f: impl FnOnce(&mut drive::Apart) -> T) -> T {
-        f(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-}
-
-#[pymethods]
-impl Apart {
-    #[new]
-    #[pyo3(signature = (named, trusted, /))]
-    fn new(named: &Family, trusted: bool) -> Self {
-        Self(Mutex::new(drive::Apart::new(&named.0, Families::shipped(), trusted)))
-    }
-
-    #[getter]
-    fn is_asked(&self) -> bool {
-        self.with(|apart| apart.is_asked())
-    }
-
-    #[getter]
-    fn shows_named(&self) -> bool {
-        self.with(|apart| apart.shows_named())
-    }
-
-    #[pyo3(signature = (answer, /))]
-    fn heard(&self, answer: Heard) -> bool {
-        self.with(|apart| apart.heard(answer.0))
-    }
-
-    #[pyo3(signature = (what, /))]
-    fn verdict(&self, what: &Bound<'_, PyAny>) -> PyResult<Told> {
-        let what = what_of(what)?;
-        Ok(match self.with(|apart| apart.verdict(what)) {
-            Verdict::Ask(place) => (Some(place.number()), None, Vec::new()),
-            Verdict::Take(family) => (None, Some(family.name().to_owned()), Vec::new()),
-            Verdict::Undecided(families) => (None, None, names(&families)),
-            // What a later core says besides decides nothing here.
-            _ => (None, None, Vec::new()),
-        })
     }
 }
 
@@ -167,7 +106,7 @@ pub(crate) fn against(py: Python<'_>, found: Contradiction) -> PyResult<Against<
     })
 }
 
-fn names(families: &[Arc<drive::Family>]) -> Vec<String> {
+pub(crate) fn names(families: &[Arc<drive::Family>]) -> Vec<String> {
     families.iter().map(|family| family.name().to_owned()).collect()
 }
 
@@ -176,7 +115,7 @@ fn all(answers: Vec<Heard>) -> Vec<Answer> {
 }
 
 /// A command by its name, or a place.
-fn what_of(given: &Bound<'_, PyAny>) -> PyResult<What> {
+pub(crate) fn what_of(given: &Bound<'_, PyAny>) -> PyResult<What> {
     if !given.is_instance_of::<PyString>() {
         return place_of(given).map(What::Word);
     }

@@ -1,0 +1,228 @@
+//! As what a unit is halted: by the command of its name, or where it may be another drive by that of what it shows.
+//!
+//! The code that stops one family starts another. A unit that this line has identified is taken for what it is. Of any
+//! other a few words are asked first, before everything that waits for the line, and none of them again: [`Apart`] says
+//! which, and what they tell. A unit that says nothing at all is taken for what it was named as, since silence is no
+//! evidence; what it is is then asked behind the halt.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use drivebus_drives::Command;
+use drivebus_rtu::Instant;
+use thiserror::Error;
+
+use crate::apart::{Apart, Verdict};
+use crate::asked::{NotTold, answer_at, answer_once};
+use crate::families::Families;
+use crate::family::Family;
+use crate::harm::What;
+use crate::huanyang::may_be_of;
+use crate::same_unit::SameUnit;
+use crate::task::{Cause, LineError, Mailbox, Read};
+
+/// For so long a unit is given to answer what is asked before a halt, and the halt itself.
+pub const ANSWER_WITHIN: Duration = Duration::from_millis(100);
+
+/// Most questions about one unit; the longest way through the shipped families takes 15.
+const QUESTIONS: usize = 24;
+
+/// What is sent to halt a unit.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Target {
+    /// The family that it is taken for.
+    pub family: Arc<Family>,
+    /// The command of that family.
+    pub command: Command,
+}
+
+/// Why a unit is not halted by what was meant, or nothing is written to it. `E` is the error of whoever drives.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum NotTaken<E> {
+    /// It did not say what it is, or was not asked.
+    #[error("the unit does not say what it is ({0})")]
+    NotTold(NotTold<E>),
+    /// It may be any of these, which what was meant may start or change; where there are none, it fits no family.
+    #[error("by what the unit answers it may be {}", titles(.0))]
+    MayBe(Vec<Arc<Family>>),
+}
+
+fn titles(families: &[Arc<Family>]) -> String {
+    let titles: Vec<_> = families.iter().map(|family| family.profile().title()).collect();
+    if titles.is_empty() { "a drive of another family".to_owned() } else { titles.join(", ") }
+}
+
+/// The look at one unit that comes before a halt. What was answered is kept between two tries.
+#[derive(Debug)]
+pub struct Aim {
+    same: SameUnit,
+    look: Mutex<Look>,
+}
+
+#[derive(Debug)]
+struct Look {
+    apart: Apart,
+    is_doubted: bool,
+    heard: Instant,
+}
+
+impl Aim {
+    /// Nothing was asked yet of the unit, as it was named, which may be one of `families` as well.
+    pub fn new(same: SameUnit, families: &Families, now: Instant) -> Self {
+        let apart = Apart::new(same.family(), families, same.is_trusted());
+        Self { same, look: Mutex::new(Look { apart, is_doubted: false, heard: now }) }
+    }
+
+    /// The line's clock when the unit last answered what it was asked, or may have; at first when this was made.
+    pub fn heard(&self) -> Instant {
+        self.with(|look| look.heard)
+    }
+
+    /// Puts in doubt what it was halted as: what it says now decides, and silence says nothing. Not so where it was.
+    pub fn doubt(&self, families: &Families) -> bool {
+        let apart = || Apart::new(self.same.family(), families, self.same.is_trusted());
+        self.with(|look| {
+            let is_new = !look.is_doubted;
+            if is_new {
+                (look.apart, look.is_doubted) = (apart(), true);
+            }
+            is_new
+        })
+    }
+
+    /// As what to halt the unit by `command`; `None` where it did not say yet.
+    ///
+    /// # Errors
+    ///
+    /// [`NotTaken::MayBe`] where it may be one of several families that want different words, or fits none. What whoever
+    /// drives made of a question, but for a refusal and silence. Nothing but reads was wished for.
+    pub async fn take<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        families: &Families,
+        command: Command,
+    ) -> Result<Option<Target>, NotTaken<E>> {
+        let (what, unit) = (What::Command(command), self.same.unit());
+        let is_doubted = || self.with(|look| look.is_doubted);
+        let named = || Some(Target { family: Arc::clone(self.same.family()), command });
+        if !is_doubted() && goes_out_at_once(&self.same, families, what, line.connection()) {
+            return Ok(named());
+        }
+        for _ in 0..QUESTIONS {
+            let place = match self.with(|look| look.apart.verdict(what)) {
+                Verdict::Ask(place) => place,
+                Verdict::Take(family) => return self.target(line, family, command).map(Some),
+                Verdict::Undecided(others) => return Err(NotTaken::MayBe(others)),
+            };
+            let read = Read::word(unit, place).urgent(true).once_within(ANSWER_WITHIN);
+            let answer = match answer_once(line, read).await {
+                Ok(answer) => answer,
+                Err(error) if !matches!(error.cause(), Cause::NoAnswer | Cause::BadAnswer) => {
+                    return Err(NotTaken::NotTold(NotTold::Failed(error)));
+                }
+                Err(error) if may_be_of(unit, error.raw()) => {
+                    self.with(|look| look.heard = line.now());
+                    return Ok(None);
+                }
+                // Silence is no evidence. Where it spoke before, the line lost this one.
+                Err(_) if is_doubted() || self.with(|look| look.apart.is_asked()) => return Ok(None),
+                Err(_) => return Ok(named()),
+            };
+            let is_telling = self.with(|look| {
+                look.heard = line.now();
+                look.apart.heard(answer)
+            });
+            if !is_telling {
+                return Ok(None);
+            }
+        }
+        Err(NotTaken::MayBe(Vec::new()))
+    }
+
+    /// The unit as one of `family`.
+    fn target<E>(&self, line: &Mailbox<E>, family: Arc<Family>, command: Command) -> Result<Target, NotTaken<E>> {
+        if Arc::ptr_eq(&family, self.same.family()) {
+            if self.with(|look| look.apart.shows_named()) {
+                self.same.identity().settle(line.connection(), line.now());
+            }
+            return Ok(Target { family, command });
+        }
+        match family.halt_for(command) {
+            // That its own papers are thin is no reason to let it run: nothing else halts what shows this family.
+            Some(command) => Ok(Target { family, command }),
+            None => Err(NotTaken::MayBe(vec![family])),
+        }
+    }
+
+    fn with<T>(&self, f: impl FnOnce(&mut Look) -> T) -> T {
+        f(&mut self.look.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// Whether nothing is asked before `what` is sent: the line has identified the unit over this connection, or it harms no
+/// family.
+///
+/// Where a name is said to be meant, only what the unit itself shows counts for a command. What speaks against a name is
+/// known of `families` alone: a unit of somebody's own one has to show it.
+pub fn goes_out_at_once(same: &SameUnit, families: &Families, what: What, connection: u64) -> bool {
+    let (identity, is_trusted) = (same.identity(), same.is_trusted());
+    if identity.is_sure(connection) {
+        return true;
+    }
+    if let What::Word(place) = what
+        && (is_trusted || identity.is_harmless(place, connection))
+    {
+        return true;
+    }
+    let is_listed = || families.named(same.family().profile().family()).is_some();
+    let is_known = identity.is_known(connection) && !is_trusted && is_listed();
+    is_known || families.harmed(what, same.family()).is_empty()
+}
+
+/// Makes sure that `what` is not sent to a unit of a family that it would do harm to: a command that does not halt, or any
+/// word. Only reads, and only where the line has not identified the unit.
+///
+/// # Errors
+///
+/// [`NotTaken`]: what was to follow must not be sent.
+pub async fn check_harmless<E: LineError>(
+    line: &Mailbox<E>,
+    families: &Families,
+    same: &SameUnit,
+    what: What,
+) -> Result<(), NotTaken<E>> {
+    if goes_out_at_once(same, families, what, line.connection()) {
+        return Ok(());
+    }
+    let named = same.family();
+    let mut apart = Apart::new(named, families, same.is_trusted());
+    for _ in 0..QUESTIONS {
+        let place = match apart.verdict(what) {
+            Verdict::Ask(place) => place,
+            Verdict::Undecided(others) => return Err(NotTaken::MayBe(others)),
+            Verdict::Take(family) if !Arc::ptr_eq(&family, named) && family.is_harmed_by(what, named) => {
+                return Err(NotTaken::MayBe(vec![family]));
+            }
+            Verdict::Take(_) => {
+                if let What::Word(place) = what {
+                    // Whoever would take harm from some word there, would from none that halts.
+                    if apart.shows_named() && named.profile().is_command(place) {
+                        same.identity().settle(line.connection(), line.now());
+                    }
+                    same.identity().found_harmless(place, line.connection());
+                }
+                return Ok(());
+            }
+        };
+        let answer = answer_at(line, Read::word(same.unit(), place)).await.map_err(NotTaken::NotTold)?;
+        if !apart.heard(answer) {
+            break;
+        }
+    }
+    Err(NotTaken::MayBe(Vec::new()))
+}
+
+#[cfg(test)]
+mod tests;

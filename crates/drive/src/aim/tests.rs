@@ -1,0 +1,200 @@
+use drivebus_drives::Place;
+use drivebus_rtu::{ExceptionCode, Meaning, crc16};
+use proptest::prelude::*;
+
+use super::*;
+use crate::same_unit::Identity;
+use crate::scripted::{Fault, Reply, Script, UNIT, any_family, any_reply, fails, like, refuses, shipped};
+
+const STOP: What = What::Command(Command::Stop);
+
+/// A place that an EDS300 is commanded at, and a Goodrive.
+const COMMANDS: u16 = 0x2000;
+
+struct Aimed {
+    same: SameUnit,
+    aim: Arc<Aim>,
+    script: Script,
+}
+
+impl Aimed {
+    fn of(family: &str) -> Self {
+        Self::at(&shipped(family), false)
+    }
+
+    fn at(family: &Arc<Family>, is_trusted: bool) -> Self {
+        let same = SameUnit::new(UNIT, family, &Identity::new(0), is_trusted);
+        let aim = Arc::new(Aim::new(same.clone(), Families::shipped(), Instant::ZERO));
+        Self { same, aim, script: Script::new() }
+    }
+
+    fn take(&mut self, command: Command, unit: impl FnMut(Read) -> Reply) -> Result<Option<Target>, NotTaken<Fault>> {
+        let aim = Arc::clone(&self.aim);
+        self.script.carry_out(unit, |line| async move { aim.take(&line, Families::shipped(), command).await })
+    }
+
+    fn stop(&mut self, unit: impl FnMut(Read) -> Reply) -> Option<(String, Command)> {
+        let target = self.take(Command::Stop, unit).unwrap()?;
+        Some((target.family.name().to_owned(), target.command))
+    }
+
+    fn check_harmless(&mut self, what: What, unit: impl FnMut(Read) -> Reply) -> Result<(), NotTaken<Fault>> {
+        let same = self.same.clone();
+        self.script.carry_out(unit, |line| async move { check_harmless(&line, Families::shipped(), &same, what).await })
+    }
+
+    fn at_once(&self, what: What) -> bool {
+        goes_out_at_once(&self.same, Families::shipped(), what, self.script.connection)
+    }
+}
+
+fn gd350(read: Read) -> Reply {
+    like(&shipped("gd350"), &[(0x2103, 0x01A0), (0x2100, 3)])(read)
+}
+
+/// GD350 manual, chapter 9.4.5: 5 stops it. EDS300 manual, p. 46: 5 runs one.
+#[test]
+fn a_unit_is_asked_what_it_is_before_a_halt_that_may_start_it() {
+    let mut aimed = Aimed::of("gd350");
+    assert!(!aimed.at_once(STOP));
+    assert_eq!(aimed.stop(gd350), Some(("gd350".to_owned(), Command::Stop)));
+    assert_eq!(aimed.script.asked.first().map(|read| read.place), Some(Place::from(0x2103)));
+    for read in &aimed.script.asked {
+        let how = (read.is_urgent, read.timeout, read.retries, read.count);
+        assert_eq!(how, (true, Some(Duration::from_millis(100)), Some(0), 1));
+    }
+    assert_eq!(aimed.aim.heard(), aimed.script.now);
+    // It is asked no second time.
+    assert!(aimed.at_once(STOP));
+    aimed.stop(|_| panic!("it was identified"));
+}
+
+/// What shows another family is halted as that.
+#[test]
+fn a_unit_is_halted_as_what_it_shows() {
+    let mut aimed = Aimed::of("eds300");
+    assert_eq!(aimed.stop(gd350), Some(("gd350".to_owned(), Command::Stop)));
+    assert!(!aimed.same.identity().is_sure(0));
+}
+
+/// 7000H is nothing but a VFD500's command.
+#[test]
+fn nothing_is_asked_before_what_harms_nobody() {
+    let mut aimed = Aimed::of("vfd500");
+    assert_eq!(aimed.stop(|_| panic!("no question")), Some(("vfd500".to_owned(), Command::Stop)));
+    assert!(aimed.at_once(STOP));
+}
+
+#[test]
+fn silence_is_no_evidence() {
+    let mut aimed = Aimed::of("gd350");
+    assert_eq!(aimed.stop(|_| fails(Cause::NoAnswer)), Some(("gd350".to_owned(), Command::Stop)));
+    assert_eq!(aimed.script.asked.len(), 1);
+    assert_eq!(aimed.aim.heard(), Instant::ZERO);
+    // What was halted in doubt has to say what it is.
+    assert!(aimed.aim.doubt(Families::shipped()));
+    assert!(!aimed.aim.doubt(Families::shipped()));
+    assert_eq!(aimed.stop(|_| fails(Cause::NoAnswer)), None);
+    // One that spoke before was lost by the line.
+    let mut aimed = Aimed::of("gd350");
+    let mut answers = [Ok(0x0199), fails(Cause::NoAnswer)].into_iter();
+    assert_eq!(aimed.stop(|_| answers.next().unwrap()), None);
+}
+
+#[test]
+fn a_damaged_answer_may_be_of_the_unit_and_noise_is_not() {
+    let damaged = |raw: &[u8]| Err(Fault { cause: Cause::BadAnswer, raw: raw.to_vec() });
+    let mut other = vec![9, 3, 2, 0, 7];
+    other.extend(crc16(&other).to_le_bytes());
+    for (raw, is_heard) in [(&[UNIT.get(), 3, 2][..], true), (&[0xFF, 0], false), (&other, false)] {
+        let mut aimed = Aimed::of("gd350");
+        assert_eq!(aimed.stop(|_| damaged(raw)).is_none(), is_heard, "{raw:02X?}");
+        assert_eq!(aimed.aim.heard() == aimed.script.now, is_heard, "{raw:02X?}");
+    }
+}
+
+#[test]
+fn one_that_is_busy_did_not_say_yet() {
+    let mut aimed = Aimed::of("gd350");
+    assert_eq!(aimed.stop(|_| refuses(0x06)), None);
+    assert_eq!(aimed.script.asked.len(), 1);
+    let lost = aimed.take(Command::Stop, |_| fails(Cause::Port)).unwrap_err();
+    assert!(matches!(lost, NotTaken::NotTold(NotTold::Failed(error)) if error.cause == Cause::Port));
+}
+
+/// By an exception that no documents list, and the specification neither, it is of none that lists them.
+#[test]
+fn one_that_fits_nothing_is_not_halted() {
+    let mut aimed = Aimed::of("gd350");
+    let error = aimed.take(Command::Stop, |_| refuses(0x63)).unwrap_err();
+    let NotTaken::MayBe(others) = &error else { panic!("{error}") };
+    assert!(others.iter().all(|family| family.name() != "gd350"));
+    assert!(error.to_string().starts_with("by what the unit answers it may be "), "{error}");
+}
+
+#[test]
+fn a_word_is_not_sent_to_one_that_it_would_harm() {
+    let word = What::Word(COMMANDS.into());
+    let mut aimed = Aimed::of("gd350");
+    let eds300 = |read: Read| like(&shipped("eds300"), &[])(read);
+    assert!(matches!(aimed.check_harmless(word, eds300), Err(NotTaken::MayBe(_))));
+    assert!(aimed.script.asked.iter().all(|read| !read.is_urgent && read.timeout.is_none()));
+    // One that shows its name is settled by that, and asked no more.
+    aimed.check_harmless(word, gd350).unwrap();
+    assert!(aimed.at_once(word) && aimed.at_once(STOP));
+    aimed.check_harmless(word, |_| panic!("it is known")).unwrap();
+    // Nor is one asked whose name is meant, but for a command.
+    let mut trusted = Aimed::at(&shipped("gd350"), true);
+    trusted.check_harmless(word, |_| panic!("it is trusted")).unwrap();
+    assert!(!trusted.at_once(STOP));
+}
+
+#[test]
+fn who_does_not_say_what_it_is_is_not_written_to() {
+    let word = What::Word(COMMANDS.into());
+    let mut aimed = Aimed::of("gd350");
+    for cause in [Cause::NoAnswer, Cause::BadAnswer, Cause::Port, Cause::Other] {
+        let error = aimed.check_harmless(word, |_| fails(cause)).unwrap_err();
+        assert!(matches!(error, NotTaken::NotTold(NotTold::Failed(error)) if error.cause == cause));
+    }
+    let busy = aimed.check_harmless(word, |_| refuses(0x06)).unwrap_err();
+    assert!(busy.to_string().contains("busy"), "{busy}");
+    assert!(matches!(busy, NotTaken::NotTold(NotTold::Busy { times: 5, .. })));
+    // By another maker's word for a decision it says no more.
+    let later = || fails(Cause::Refused(ExceptionCode(6), Meaning::NotNow));
+    assert!(matches!(aimed.check_harmless(word, |_| later()), Err(NotTaken::MayBe(none)) if none.is_empty()));
+}
+
+proptest! {
+    /// Whatever comes, it ends, and what is halted is halted by a command that the family has.
+    #[test]
+    fn it_ends(
+        family in any_family(),
+        is_trusted: bool,
+        replies in proptest::collection::vec(any_reply(), 1..60),
+        calls in proptest::collection::vec((0u8..4, any::<u16>()), 1..6),
+    ) {
+        let mut replies = replies.iter().cycle();
+        let mut aimed = Aimed::at(&family, is_trusted);
+        for (call, address) in calls {
+            let mut unit = |_: Read| replies.next().unwrap().clone();
+            match call {
+                0 => {
+                    aimed.aim.doubt(Families::shipped());
+                }
+                1 => {
+                    // Each is asked five times at most.
+                    let _ = aimed.check_harmless(What::Word(address.into()), &mut unit);
+                    prop_assert!(aimed.script.asked.len() <= 5 * QUESTIONS);
+                }
+                _ => {
+                    if let Ok(Some(target)) = aimed.take(Command::Coast, &mut unit) {
+                        let has = target.family.profile().commands().contains_key(&target.command);
+                        prop_assert!(has || Arc::ptr_eq(&target.family, &family));
+                    }
+                    prop_assert!(aimed.script.asked.len() <= QUESTIONS);
+                }
+            }
+        }
+    }
+}
