@@ -53,6 +53,7 @@
 //! | `same_unit` | whether a unit is what it was named as, and still the one it was |
 //! | `huanyang` | frames of another protocol on the same wires, and what may be an answer |
 //! | `aim` | as what a unit is halted, and whether a word may be sent to it |
+//! | `look` | what the status words of a drive say |
 //! | `task` | operations that wait for a line, and how they are driven without one |
 
 #![forbid(unsafe_code)]
@@ -70,6 +71,7 @@ mod guard;
 mod harm;
 pub mod huanyang;
 mod identify;
+mod look;
 mod rule;
 mod same_unit;
 #[cfg(test)]
@@ -89,6 +91,7 @@ pub use family::{Family, HALTS};
 pub use guard::Forbidden;
 pub use harm::What;
 pub use identify::{Certainty, Identification, Reason, identify};
+pub use look::{Look, Looks};
 pub use rule::{Rule, WhyNot};
 pub use same_unit::{Identity, NotSame, SameUnit, Told};
 

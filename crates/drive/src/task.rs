@@ -18,7 +18,7 @@ use drivebus_rtu::Instant;
 use thiserror::Error;
 
 pub use line_error::{Cause, LineError};
-pub use wish::{Read, Wish};
+pub use wish::{Read, Stamped, Wish};
 
 /// What is seen of the line before a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +37,8 @@ pub struct Seen {
 pub enum Outcome<E> {
     /// The words that were read, as many as were asked for.
     Words(Vec<u16>),
+    /// The same of a read that is to be stamped.
+    Stamped(Stamped),
     /// The time is over.
     Slept,
     /// It failed.
@@ -111,9 +113,23 @@ impl<E> Mailbox<E> {
         let words = |outcome| match outcome {
             Outcome::Words(words) => Some(Ok(words)),
             Outcome::Failed(error) => Some(Err(error)),
-            Outcome::Slept => None,
+            Outcome::Stamped(_) | Outcome::Slept => None,
         };
-        self.ask(Wish::Read(read), words).await
+        self.ask(Wish::Read(Read { is_stamped: false, ..read }), words).await
+    }
+
+    /// Reads words, with the moments at which that was.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`](Self::read) has them.
+    pub async fn read_stamped(&self, read: Read) -> Result<Stamped, E> {
+        let stamped = |outcome| match outcome {
+            Outcome::Stamped(stamped) => Some(Ok(stamped)),
+            Outcome::Failed(error) => Some(Err(error)),
+            Outcome::Words(_) | Outcome::Slept => None,
+        };
+        self.ask(Wish::Read(Read { is_stamped: true, ..read }), stamped).await
     }
 
     /// Waits on the line's clock; others may use the line meanwhile.
@@ -125,7 +141,7 @@ impl<E> Mailbox<E> {
         let slept = |outcome| match outcome {
             Outcome::Slept => Some(Ok(())),
             Outcome::Failed(error) => Some(Err(error)),
-            Outcome::Words(_) => None,
+            Outcome::Words(_) | Outcome::Stamped(_) => None,
         };
         self.ask(Wish::Sleep(time), slept).await
     }

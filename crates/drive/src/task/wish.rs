@@ -23,7 +23,8 @@ impl Wish {
     pub(super) fn is_met_by<E>(&self, outcome: &Outcome<E>) -> bool {
         match (self, outcome) {
             (_, Outcome::Failed(_)) | (Self::Sleep(_), Outcome::Slept) => true,
-            (Self::Read(read), Outcome::Words(words)) => words.len() == usize::from(read.count),
+            (Self::Read(read), Outcome::Words(words)) => !read.is_stamped && read.takes(words),
+            (Self::Read(read), Outcome::Stamped(stamped)) => read.is_stamped && read.takes(&stamped.words),
             _ => false,
         }
     }
@@ -50,6 +51,8 @@ pub struct Read {
     pub count: u16,
     /// Before all who wait for the line.
     pub is_urgent: bool,
+    /// Whether it counts when that was.
+    pub is_stamped: bool,
     /// How long this read alone waits for its answer; `None` is what the line has.
     pub timeout: Option<Duration>,
     /// How often this read alone is repeated; `None` is what the line has.
@@ -59,7 +62,12 @@ pub struct Read {
 impl Read {
     /// A read of the word of `unit` at `place`, as the line reads.
     pub const fn word(unit: UnitAddress, place: Place) -> Self {
-        Self { unit, place, count: 1, is_urgent: false, timeout: None, retries: None }
+        Self::words(unit, place, 1)
+    }
+
+    /// A read of `count` words of `unit` from `place` on, as the line reads.
+    pub const fn words(unit: UnitAddress, place: Place, count: u16) -> Self {
+        Self { unit, place, count, is_urgent: false, is_stamped: false, timeout: None, retries: None }
     }
 
     /// The same before all who wait for the line, where that is so.
@@ -73,6 +81,11 @@ impl Read {
     pub const fn once_within(self, timeout: Duration) -> Self {
         Self { timeout: Some(timeout), retries: Some(0), ..self }
     }
+
+    /// Whether `words` are as many as it asks for.
+    fn takes(&self, words: &[u16]) -> bool {
+        words.len() == usize::from(self.count)
+    }
 }
 
 impl fmt::Display for Read {
@@ -83,4 +96,15 @@ impl fmt::Display for Read {
             _ => write!(f, "a read of {count} from {place} of unit {}", unit.get()),
         }
     }
+}
+
+/// The words of a read, and when that was, in Unix time.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Stamped {
+    /// The words, as many as were asked for.
+    pub words: Vec<u16>,
+    /// When the request had left.
+    pub asked: Duration,
+    /// When the answer was complete.
+    pub answered: Duration,
 }

@@ -1,0 +1,196 @@
+//! A look at a drive: what its status words say, in the fewest reads.
+//!
+//! Which words those are, and what they mean, its profile says. What no document of the family proves is left out unless
+//! that is trusted: half of a state is better than none.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+use std::time::Duration;
+
+use drivebus_drives::{Entry, Fault, Profile, ReadPlan, State};
+use drivebus_rtu::UnitAddress;
+
+use crate::rule::{Rule, WhyNot};
+use crate::task::{Mailbox, Read};
+
+/// What a look at units of one family reads, under one trust. Worked out once, and used for every look.
+#[derive(Debug)]
+pub struct Looks {
+    profile: Arc<Profile>,
+    is_trusted: bool,
+    /// What is read; `None` where nothing may be.
+    plan: Option<ReadPlan>,
+    /// What stands in the plan, in its order.
+    words: Vec<Word>,
+}
+
+/// A word of a look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Word {
+    role: Role,
+    /// Which of the profile's status words it is, where its bits tell more.
+    status_word: Option<usize>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Role {
+    State,
+    Fault,
+    /// Its bits alone count.
+    Bits,
+}
+
+/// What one look showed.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Look {
+    /// What the motor does; unknown where no word tells, or that word is none of the documented ones.
+    pub state: State,
+    /// The state word itself; `None` where it may not be read.
+    pub word: Option<u16>,
+    /// The number of the fault, 0 where there is none; `None` where no register of it may be read.
+    pub fault: Option<u16>,
+    /// Whether the state word says that the drive is in fault, or where it cannot, the number. It may run all the same.
+    pub is_in_fault: bool,
+    /// What the bit fields of the status words mean, by their names.
+    pub fields: BTreeMap<String, String>,
+    /// When the first of it was asked for, in Unix time; zero where nothing was.
+    pub asked: Duration,
+}
+
+impl Look {
+    /// Whether the drive is in fault: by its state word, or where that may not be read by the number of its fault.
+    pub fn is_tripped(&self) -> bool {
+        self.is_in_fault || (self.word.is_none() && self.fault.is_some_and(|number| number != 0))
+    }
+
+    /// What `profile` calls the fault that it shows; `None` where it shows none.
+    pub fn fault_of<'p>(&self, profile: &'p Profile) -> Option<Cow<'p, Fault>> {
+        self.fault.filter(|&number| number != 0).map(|number| profile.fault(number))
+    }
+}
+
+impl fmt::Display for Look {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.word {
+            None => f.write_str("state not known")?,
+            Some(_) => write!(f, "{}", self.state.name().replace('_', " "))?,
+        }
+        match self.fault {
+            Some(0) => Ok(()),
+            Some(number) => write!(f, ", fault {number}"),
+            None => f.write_str(", fault not known"),
+        }
+    }
+}
+
+impl Looks {
+    /// Looks at units of `profile`; where `is_trusted`, also by what no document of the family prints.
+    pub fn new(profile: &Arc<Profile>, is_trusted: bool) -> Self {
+        let rule = rule_of(profile, is_trusted);
+        let register = profile.role("state");
+        let state = register.filter(|_| rule.state().is_ok());
+        let fault = profile.role("fault").filter(|_| rule.fault().is_ok());
+        let is = |one: Option<&Entry>, other: &Entry| one.is_some_and(|one| one.name() == other.name());
+        let bits: Vec<_> = profile.status_words().enumerate().collect();
+        let mut words = Vec::new();
+        let mut entries = Vec::new();
+        if let Some(state) = state {
+            let status_word = bits.iter().find(|(_, word)| is(Some(state), word)).map(|&(index, _)| index);
+            words.push(Word { role: Role::State, status_word });
+            entries.push(state);
+        }
+        for (index, word) in bits.into_iter().filter(|(_, word)| !is(register, word) && rule.read(word).is_ok()) {
+            words.push(Word { role: Role::Bits, status_word: Some(index) });
+            entries.push(word);
+        }
+        if let Some(fault) = fault {
+            words.push(Word { role: Role::Fault, status_word: None });
+            entries.push(fault);
+        }
+        // What may be read can be.
+        let plan = if entries.is_empty() { None } else { profile.compile(&entries).ok() };
+        Self { profile: Arc::clone(profile), is_trusted, plan, words }
+    }
+
+    /// What is known of the family.
+    pub fn profile(&self) -> &Arc<Profile> {
+        &self.profile
+    }
+
+    /// Whether nothing may be read: then no look shows anything.
+    pub fn is_blind(&self) -> bool {
+        self.plan.is_none()
+    }
+
+    /// Whether the state of its units may be used.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Rule::state`].
+    pub fn state(&self) -> Result<(), WhyNot<'_>> {
+        rule_of(&self.profile, self.is_trusted).state()
+    }
+
+    /// Whether the present fault of its units may be read.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Rule::fault`].
+    pub fn fault(&self) -> Result<(), WhyNot<'_>> {
+        rule_of(&self.profile, self.is_trusted).fault()
+    }
+
+    /// Looks at `unit`, before all who wait for the line where it `is_urgent`. Where nothing may be read, nothing is asked.
+    ///
+    /// # Errors
+    ///
+    /// Those of the line; the drive goes on as it was.
+    pub async fn look<E>(&self, line: &Mailbox<E>, unit: UnitAddress, is_urgent: bool) -> Result<Look, E> {
+        let mut asked = None;
+        let mut came = Vec::new();
+        for span in self.plan.iter().flat_map(ReadPlan::reads) {
+            let read = Read::words(unit, span.place(), span.count).urgent(is_urgent);
+            let stamped = line.read_stamped(read).await?;
+            asked.get_or_insert(stamped.asked);
+            came.extend(stamped.words);
+        }
+        Ok(self.shown(&came, asked.unwrap_or_default()))
+    }
+
+    /// What the words of all reads show, which were `asked` for then.
+    fn shown(&self, came: &[u16], asked: Duration) -> Look {
+        let (mut state, mut fault, mut fields) = (None, None, BTreeMap::new());
+        let values = self.plan.iter().flat_map(|plan| plan.values(came));
+        for (word, (_, value)) in self.words.iter().zip(values) {
+            let Some(raw) = value.and_then(|value| u16::try_from(value.count() & 0xFFFF).ok()) else { continue };
+            match word.role {
+                Role::State => state = Some(raw),
+                Role::Fault => fault = Some(self.profile.fault_number(raw)),
+                Role::Bits => {}
+            }
+            let bits = word.status_word.and_then(|index| self.profile.status_words().nth(index));
+            for field in bits.into_iter().flat_map(Entry::bits) {
+                fields.insert(field.name().to_owned(), field.meaning(raw).into_owned());
+            }
+        }
+        let is_numbered = fault.is_some_and(|number| number != 0) && !self.profile.state_tells_fault();
+        Look {
+            state: state.map_or(State::Unknown, |raw| self.profile.state(raw)),
+            word: state,
+            fault,
+            is_in_fault: state.is_some_and(|raw| self.profile.is_in_fault(raw) || is_numbered),
+            fields,
+            asked,
+        }
+    }
+}
+
+fn rule_of(profile: &Profile, is_trusted: bool) -> Rule<'_> {
+    if is_trusted { Rule::trusting(profile) } else { Rule::printed(profile) }
+}
+
+#[cfg(test)]
+mod tests;

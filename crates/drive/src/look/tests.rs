@@ -1,0 +1,81 @@
+use std::collections::BTreeSet;
+
+use drivebus_drives::Place;
+use drivebus_rtu::Instant;
+
+use super::*;
+use crate::task::{Outcome, Seen, Stamped, Step, Task, Wish};
+
+fn builtin(name: &str) -> Arc<Profile> {
+    Profile::builtin(name).unwrap()
+}
+
+/// The look at a unit that answers with these `words` by place, and the places that it was asked for.
+fn looked(name: &str, is_trusted: bool, words: &[(u16, u16)]) -> (Look, BTreeSet<Place>) {
+    let looks = Looks::new(&builtin(name), is_trusted);
+    let mut task: Task<Result<Look, ()>, ()> =
+        Task::new(async move |line| looks.look(&line, UnitAddress::MIN, true).await);
+    let seen = Seen { now: Instant::ZERO, connection: 0, is_closed: false };
+    let (mut outcome, mut asked, mut second) = (None, BTreeSet::new(), 0);
+    loop {
+        outcome = match task.step(seen, outcome).unwrap() {
+            Step::Done(look) => return (look.unwrap(), asked),
+            Step::Wish(Wish::Read(read)) => {
+                assert!(read.is_urgent && read.is_stamped, "{read:?}");
+                second += 1;
+                let first = read.place.address;
+                let places: Vec<_> = (first..first + read.count).collect();
+                asked.extend(places.iter().map(|&address| Place::from(address)));
+                let word =
+                    |address: &u16| words.iter().find(|(known, _)| known == address).map_or(0, |&(_, word)| word);
+                let (asked, answered) = (Duration::from_secs(second), Duration::from_secs(second));
+                Some(Outcome::Stamped(Stamped { words: places.iter().map(word).collect(), asked, answered }))
+            }
+            Step::Wish(wish) => panic!("{wish}"),
+        };
+    }
+}
+
+/// GD350 operation manual, section 9.4.5: 2100H is the state, 2101H has bits, 2102H the fault code.
+#[test]
+fn the_words_of_a_gd350() {
+    let (look, asked) = looked("gd350", false, &[(0x2100, 1), (0x2101, 0x0001), (0x2102, 0)]);
+    assert_eq!(asked, [0x2100, 0x2101, 0x2102].map(Place::from).into());
+    assert_eq!((look.state, look.word, look.fault, look.is_tripped()), (State::Forward, Some(1), Some(0), false));
+    assert_eq!(look.fields.get("ready").map(String::as_str), Some("ready"));
+    assert_eq!(look.asked, Duration::from_secs(1));
+    assert_eq!(look.to_string(), "forward");
+
+    let (look, _) = looked("gd350", false, &[(0x2100, 4), (0x2102, 10)]);
+    assert_eq!((look.state, look.fault, look.is_in_fault), (State::Fault, Some(10), true));
+    assert_eq!(look.to_string(), "fault, fault 10");
+    assert_eq!(look.fault_of(&builtin("gd350")).unwrap().code, 10);
+}
+
+/// The codes of a GD600's states are on no page, and its fault code is.
+#[test]
+fn what_no_document_prints_is_left_out_until_it_is_trusted() {
+    let looks = Looks::new(&builtin("gd600"), false);
+    assert!(matches!(looks.state(), Err(WhyNot::NotPrinted(_))));
+    assert_eq!(Looks::new(&builtin("gd600"), true).state(), Ok(()));
+    let (printed, _) = looked("gd600", false, &[]);
+    assert_eq!((printed.state, printed.word), (State::Unknown, None));
+    let (trusted, _) = looked("gd600", true, &[]);
+    assert_eq!(trusted.word, Some(0));
+}
+
+/// In every family, trusted or not: what the look asks for may be read, and what it says is what the words say.
+#[test]
+fn a_look_shows_what_its_words_say() {
+    for name in Profile::builtin_names() {
+        let profile = builtin(name);
+        for is_trusted in [false, true] {
+            let looks = Looks::new(&profile, is_trusted);
+            let (look, asked) = looked(name, is_trusted, &[]);
+            assert_eq!(asked.is_empty(), looks.is_blind(), "{name}");
+            assert_eq!(look.word.is_some(), looks.state().is_ok(), "{name}");
+            assert_eq!(look.fault.is_some(), looks.fault().is_ok(), "{name}");
+            assert!(look.state == look.word.map_or(State::Unknown, |word| profile.state(word)), "{name}");
+        }
+    }
+}
