@@ -54,6 +54,7 @@
 //! | `huanyang` | frames of another protocol on the same wires, and what may be an answer |
 //! | `aim` | as what a unit is halted, and whether a word may be sent to it |
 //! | `look` | what the status words of a drive say |
+//! | `speed` | how fast a motor turns, and how its drive slows it down |
 //! | `task` | operations that wait for a line, and how they are driven without one |
 
 #![forbid(unsafe_code)]
@@ -77,6 +78,7 @@ mod same_unit;
 #[cfg(test)]
 mod scripted;
 mod signatures;
+mod speed;
 pub mod task;
 
 pub use aim::{ANSWER_WITHIN, Aim, NotTaken, Target, check_harmless, goes_out_at_once};
@@ -94,6 +96,7 @@ pub use identify::{Certainty, Identification, Reason, identify};
 pub use look::{Look, Looks};
 pub use rule::{Rule, WhyNot};
 pub use same_unit::{Identity, NotSame, SameUnit, Told};
+pub use speed::{Frequencies, Ramp, STANDSTILL, Speeds};
 
 /// The examples of the README are tests.
 #[cfg(doctest)]
