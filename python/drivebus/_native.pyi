@@ -29,6 +29,7 @@ __all__ = [
     "Family",
     "Gateway",
     "Identity",
+    "Looks",
     "Mailbox",
     "Plan",
     "Poller",
@@ -636,11 +637,46 @@ def usable(certainty: str, candidates: Sequence[str], unverified: bool, /) -> st
     """The shipped family of *candidates* that a unit surely enough is to command a motor by it."""
 
 @final
+class Looks:
+    """What is looked at of units of one family: what a drive is doing, and how fast its motor turns.
+
+    What no document of the family prints is left out, unless it is trusted. Each task is for one unit (0..=255), asks
+    before all who wait where it is urgent, and fails as the bus does.
+    """
+
+    def __new__(cls, profile: Profile, trusted: bool, /) -> Looks: ...
+    @property
+    def is_blind(self) -> bool:
+        """Whether nothing of the state may be read."""
+    @property
+    def state(self) -> str | None:
+        """The name of the state word that is read; None where that may not be."""
+    @property
+    def fault(self) -> str | None:
+        """The name of the register of the present fault that is read; None where that may not be."""
+    def read_off(self, state: int | None, fault: int | None, /) -> tuple[str, int, bool]:
+        """What the words say, None of what is not known: the state, the number of the fault, whether it is in that."""
+    def look(self, unit: int, urgent: bool, /) -> Task:
+        """Comes to what the unit is doing.
+
+        That is the state, its word or None, the number of the fault or None, whether it is in that, the bit fields with
+        what they mean, and the Unix time at which the first of it was asked for.
+        """
+    def frequencies(self, unit: int, urgent: bool, /) -> Task:
+        """Comes to the output frequency and the setpoint in force or None, in Hz; to None where there are none."""
+    def output_frequency(self, unit: int, urgent: bool, /) -> Task:
+        """Comes to the output frequency in Hz; to None where the family does not tell."""
+    def turns_in_spite_of(self, unit: int, state: str, urgent: bool, /) -> Task:
+        """Comes to whether a motor whose *state* says that it rests turns. NotAllowed: there is no such state."""
+    def ramp(self, unit: int, urgent: bool, /) -> Task:
+        """Comes to the slope of the ramp in Hz/s or None, and to whether only the bus commands the drive."""
+
+@final
 class Task:
     """An operation on its way: it wishes for something, and goes on with what came of that."""
 
     def step(
-        self, now: float, connection: int, closed: bool, outcome: list[int] | Exception | None = None, /
+        self, now: float, connection: int, closed: bool, outcome: Sequence[Any] | Exception | None = None, /
     ) -> tuple[str, Any]:
         """Goes on until it wishes for something, or is done.
 
@@ -650,10 +686,12 @@ class Task:
             closed: Whether the line was closed for good.
             outcome: What came of the last wish: words of a read, an error of the line; None at the first step, and
                 where a sleep is over.
+            outcome: What came of the last wish: words of a read, with their moments where that is stamped, or an error
+                of the line; None at the first step, and where a sleep is over.
 
         Returns:
-            `"read"` and the arguments of a `drivebus.line.asking.Read`; `"sleep"` and seconds of the line's clock; or
-            `"done"` and the result.
+            `"read"` or `"stamped"` and the arguments of a `drivebus.line.asking.Read`; `"sleep"` and seconds of the
+            line's clock; or `"done"` and the result.
 
         Raises:
             DrivebusError: It failed; an error of the line that it does not handle comes back as it was given.

@@ -33,7 +33,7 @@ const AT_REST: Duration = Duration::from_millis(200);
 
 /// One look at a motor, whose frequency was what it is at some moment between two.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
+pub struct Glimpse {
     /// When the drive was asked.
     pub asked: Instant,
     /// When its answer had come.
@@ -49,7 +49,7 @@ pub struct Look {
 /// ```
 /// use std::time::Duration;
 ///
-/// use drivebus_drive::{Fall, Look};
+/// use drivebus_drive::{Fall, Glimpse};
 /// use drivebus_rtu::Instant;
 ///
 /// // It ran at 50 Hz, is set to lose 5 Hz in a second, and was told to stop at 10 s.
@@ -57,7 +57,7 @@ pub struct Look {
 /// let mut fall = Fall::new(at(10_000), at(10_010), Duration::from_secs(1));
 /// for (millis, hz) in [(10_100, 49.5), (10_300, 48.5), (10_500, 47.5), (10_700, 46.5)] {
 ///     fall.goes_on();
-///     fall.see(Look { asked: at(millis), answered: at(millis + 10), hz, setpoint: 50.0 });
+///     fall.see(Glimpse { asked: at(millis), answered: at(millis + 10), hz, setpoint: 50.0 });
 /// }
 /// assert!(fall.is_worth_asking());
 /// assert!(fall.goes_along(5.0));
@@ -79,7 +79,7 @@ pub struct Fall {
     lowest: f64,
     went_on: bool,
     rests_since: Option<Instant>,
-    looks: Vec<Look>,
+    looks: Vec<Glimpse>,
     /// Whether a look was off the ramp: whatever comes later, it was not the stop's.
     is_off: bool,
 }
@@ -147,7 +147,7 @@ impl Fall {
     }
 
     /// Takes one more `look` into account.
-    pub fn see(&mut self, look: Look) {
+    pub fn see(&mut self, look: Glimpse) {
         if look.hz < self.lowest && !self.looks.is_empty() {
             self.until = (look.answered + self.patience).min(self.longest).max(self.due);
         }

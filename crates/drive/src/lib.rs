@@ -87,7 +87,7 @@ pub use apart::{Apart, Verdict};
 pub use asked::{NotTold, answer_at, answer_once};
 pub use codes::Codes;
 pub use contradiction::Contradiction;
-pub use fall::{Fall, Look};
+pub use fall::{Fall, Glimpse};
 pub use families::Families;
 pub use family::{Family, HALTS};
 pub use guard::Forbidden;

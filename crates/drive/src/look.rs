@@ -4,7 +4,6 @@
 //! that is trusted: half of a state is better than none.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
@@ -54,8 +53,8 @@ pub struct Look {
     pub fault: Option<u16>,
     /// Whether the state word says that the drive is in fault, or where it cannot, the number. It may run all the same.
     pub is_in_fault: bool,
-    /// What the bit fields of the status words mean, by their names.
-    pub fields: BTreeMap<String, String>,
+    /// The bit fields of the status words, each by its name with what it means, in the order of the bits.
+    pub fields: Vec<(String, String)>,
     /// When the first of it was asked for, in Unix time; zero where nothing was.
     pub asked: Duration,
 }
@@ -64,6 +63,11 @@ impl Look {
     /// Whether the drive is in fault: by its state word, or where that may not be read by the number of its fault.
     pub fn is_tripped(&self) -> bool {
         self.is_in_fault || (self.word.is_none() && self.fault.is_some_and(|number| number != 0))
+    }
+
+    /// What the bit field of that name means.
+    pub fn field(&self, name: &str) -> Option<&str> {
+        self.fields.iter().find(|(known, _)| known == name).map(|(_, means)| means.as_str())
     }
 
     /// What `profile` calls the fault that it shows; `None` where it shows none.
@@ -120,6 +124,16 @@ impl Looks {
         &self.profile
     }
 
+    /// The state word that a look reads.
+    pub fn state_word(&self) -> Option<&Entry> {
+        self.profile.role("state").filter(|_| self.state().is_ok())
+    }
+
+    /// The register of the present fault that a look reads.
+    pub fn fault_register(&self) -> Option<&Entry> {
+        self.profile.role("fault").filter(|_| self.fault().is_ok())
+    }
+
     /// Whether nothing may be read: then no look shows anything.
     pub fn is_blind(&self) -> bool {
         self.plan.is_none()
@@ -162,7 +176,7 @@ impl Looks {
 
     /// What the words of all reads show, which were `asked` for then.
     fn shown(&self, came: &[u16], asked: Duration) -> Look {
-        let (mut state, mut fault, mut fields) = (None, None, BTreeMap::new());
+        let (mut state, mut fault, mut fields) = (None, None, Vec::new());
         let values = self.plan.iter().flat_map(|plan| plan.values(came));
         for (word, (_, value)) in self.words.iter().zip(values) {
             let Some(raw) = value.and_then(|value| u16::try_from(value.count() & 0xFFFF).ok()) else { continue };
@@ -173,18 +187,23 @@ impl Looks {
             }
             let bits = word.status_word.and_then(|index| self.profile.status_words().nth(index));
             for field in bits.into_iter().flat_map(Entry::bits) {
-                fields.insert(field.name().to_owned(), field.meaning(raw).into_owned());
+                fields.push((field.name().to_owned(), field.meaning(raw).into_owned()));
             }
         }
-        let is_numbered = fault.is_some_and(|number| number != 0) && !self.profile.state_tells_fault();
         Look {
             state: state.map_or(State::Unknown, |raw| self.profile.state(raw)),
             word: state,
             fault,
-            is_in_fault: state.is_some_and(|raw| self.profile.is_in_fault(raw) || is_numbered),
+            is_in_fault: self.is_in_fault(state, fault),
             fields,
             asked,
         }
+    }
+
+    /// Whether a drive is in fault whose state `word` and number of the `fault` are these; `None` is what is not known.
+    pub fn is_in_fault(&self, word: Option<u16>, fault: Option<u16>) -> bool {
+        let is_numbered = fault.is_some_and(|number| number != 0) && !self.profile.state_tells_fault();
+        word.is_some_and(|raw| self.profile.is_in_fault(raw) || is_numbered)
     }
 }
 

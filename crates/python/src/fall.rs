@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use drivebus_drive::{self as drive, Look};
+use drivebus_drive::{self as drive, Glimpse};
 use drivebus_rtu::Instant;
 use pyo3::prelude::*;
 
@@ -63,7 +63,7 @@ impl Fall {
     #[pyo3(signature = (hz, setpoint, asked, answered, /))]
     fn see(&self, hz: f64, setpoint: f64, asked: f64, answered: f64) {
         let (asked, answered) = (moment(asked), moment(answered));
-        self.with(|fall| fall.see(Look { asked, answered, hz, setpoint }));
+        self.with(|fall| fall.see(Glimpse { asked, answered, hz, setpoint }));
     }
 
     fn is_worth_asking(&self) -> bool {

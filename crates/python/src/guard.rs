@@ -7,9 +7,9 @@ use drivebus_drive::{self as drive, Families, Forbidden};
 use drivebus_drives::Place;
 use pyo3::prelude::*;
 
-use crate::family::Family;
 use crate::convert::{place_of, words_of};
 use crate::errors::bad_argument;
+use crate::family::Family;
 
 /// Why not: its kind, what people call the family, the place, and what belongs to the kind.
 #[derive(Debug, IntoPyObject)]

@@ -20,6 +20,7 @@ mod frames;
 mod gateway;
 mod guard;
 mod identify;
+mod look;
 mod mailbox;
 mod open;
 mod overhear;
@@ -68,6 +69,8 @@ mod _native {
     use crate::guard::{commanded_at, forbidden};
     #[pymodule_export]
     use crate::identify::{identify, usable};
+    #[pymodule_export]
+    use crate::look::Looks;
     #[pymodule_export]
     use crate::mailbox::Mailbox;
     #[pymodule_export]

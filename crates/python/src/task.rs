@@ -2,8 +2,9 @@
 
 use std::fmt::Debug;
 use std::sync::{Mutex, TryLockError};
+use std::time::Duration;
 
-use drivebus_drive::task::{Cause, LineError, Mailbox, Outcome, Read, Seen, Step, Wish};
+use drivebus_drive::task::{Cause, LineError, Mailbox, Outcome, Read, Seen, Stamped, Step, Wish};
 use drivebus_drive::task::{Misuse, Task as Driven};
 use drivebus_rtu::{ExceptionCode, Instant, Meaning};
 use pyo3::exceptions::PyRuntimeError;
@@ -117,10 +118,8 @@ impl Task {
         let outcome = match (outcome, task.pending()) {
             (None, Some(Wish::Sleep(_))) => Some(Outcome::Slept),
             (None, _) => None,
-            (Some(given), _) => Some(match given.extract() {
-                Ok(words) => Outcome::Words(words),
-                Err(_) => Outcome::Failed(Failed::of(given)?),
-            }),
+            (Some(given), Some(Wish::Read(read))) => Some(outcome_of(given, read)?),
+            (Some(given), _) => Some(Outcome::Failed(Failed::of(given)?)),
         };
         // Of a line that has no clock any more the time stands still.
         *latest = (*latest).max(moment(now));
@@ -128,7 +127,7 @@ impl Task {
         match task.step(seen, outcome).map_err(|misuse: Misuse| PyRuntimeError::new_err(misuse.to_string()))? {
             Step::Done(done) => Ok(("done", done?.into_bound(py))),
             Step::Wish(Wish::Sleep(time)) => Ok(("sleep", time.as_secs_f64().into_pyobject(py)?.into_any())),
-            Step::Wish(Wish::Read(read)) => Ok(("read", told_of(py, read)?)),
+            Step::Wish(Wish::Read(read)) => Ok((if read.is_stamped { "stamped" } else { "read" }, told_of(py, read)?)),
             Step::Wish(wish) => Err(unknown(&wish)),
         }
     }
@@ -137,6 +136,23 @@ impl Task {
 /// What a later core says or wants besides.
 pub(crate) fn unknown(what: &impl Debug) -> PyErr {
     PyRuntimeError::new_err(format!("nothing here knows of {what:?}"))
+}
+
+/// What came of a read: words, with their moments where it is stamped, or an error.
+fn outcome_of(given: &Bound<'_, PyAny>, read: &Read) -> PyResult<Outcome<Failed>> {
+    let came = if read.is_stamped {
+        given.extract().map(|(words, asked, answered)| {
+            Outcome::Stamped(Stamped { words, asked: since_1970(asked), answered: since_1970(answered) })
+        })
+    } else {
+        given.extract().map(Outcome::Words)
+    };
+    came.or_else(|_| Failed::of(given).map(Outcome::Failed))
+}
+
+/// Unix time; a clock before that has none.
+fn since_1970(seconds: f64) -> Duration {
+    Duration::try_from_secs_f64(seconds).unwrap_or_default()
 }
 
 /// A read, in the order of the attributes of `drivebus.line.asking.Read`.

@@ -12,7 +12,6 @@ from typing import Any
 from drivebus import _native
 from drivebus.profile import Profile
 from drivebus.profile.facts import IdentificationCode
-from drivebus.profile.family import family_of
 
 __all__ = ["address_of", "all_listed", "families_in", "listed_at", "registers", "rows_of"]
 

@@ -17,11 +17,11 @@ from drivebus import _native
 from drivebus.advice import Text
 from drivebus.errors import WrongDrive
 from drivebus.identify.contradiction import in_words
-from drivebus.profile.family import family_of
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.tasks import carried_out
 from drivebus.line.units import UnitRecord
 from drivebus.profile import Profile
+from drivebus.profile.family import family_of
 
 __all__ = ["SameUnit"]
 

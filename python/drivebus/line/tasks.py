@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeAlias
 
 from drivebus._native import Task
 from drivebus.errors import DrivebusError
-from drivebus.line.asking import Ask, Read
+from drivebus.line.asking import Ask, Read, Stamped
 from drivebus.line.protocols import AwaitableBus
 
 __all__ = ["carried_out", "carried_out_by"]
 
-_Outcome: TypeAlias = "list[int] | DrivebusError | None"
+_Outcome: TypeAlias = "list[int] | Stamped | DrivebusError | None"
+_Around: TypeAlias = Callable[[], AbstractContextManager[None]]
 
 
-async def carried_out(task: Task, bus: AwaitableBus) -> Any:
+async def carried_out(task: Task, bus: AwaitableBus, around: _Around = nullcontext) -> Any:
     """What *task* comes to over *bus*.
 
     What interrupts a wish, as Ctrl-C and a cancellation do, goes through: then the task ends where it stands.
+
+    Args:
+        task: It has not begun.
+        bus: Who is asked.
+        around: A block of its own around each request.
 
     Raises:
         DrivebusError: Those of the task, and those of *bus* that it does not handle, as they are.
@@ -32,7 +39,10 @@ async def carried_out(task: Task, bus: AwaitableBus) -> Any:
             outcome = None
         if kind == "done":
             return told
-        outcome = await (_outcome_of(bus.ask, Read(*told)) if kind == "read" else _outcome_of(bus.sleep, told))
+        if kind == "sleep":
+            outcome = await _outcome_of(bus.sleep, told, nullcontext)
+        else:
+            outcome = await _outcome_of(bus.ask if kind == "read" else bus.ask_stamped, Read(*told), around)
 
 
 async def carried_out_by(task: Task, ask: Ask) -> Any:
@@ -45,13 +55,14 @@ async def carried_out_by(task: Task, ask: Ask) -> Any:
             outcome = None
         if kind == "done":
             return told
-        outcome = await _outcome_of(ask, Read(*told))
+        outcome = await _outcome_of(ask, Read(*told), nullcontext)
 
 
-async def _outcome_of(do: Callable[[Any], Awaitable[Any]], what: object) -> _Outcome:
+async def _outcome_of(do: Callable[[Any], Awaitable[Any]], what: object, around: _Around) -> _Outcome:
     """What comes of *what*, errors included. They know this frame, and not that of whoever keeps them."""
     try:
-        outcome: list[int] | None = await do(what)
+        with around():
+            outcome: list[int] | Stamped | None = await do(what)
     except DrivebusError as error:
         return error
     return outcome

@@ -192,7 +192,7 @@ class Proof:
         fall: Fall | None = None,
     ) -> None:
         self._unit, self._command, self._shows, self._fall = unit, command, shows, fall
-        self._asked = within > 0 and state.planned(unit.evidence).plan is not None
+        self._asked = within > 0 and not state.planned(unit.evidence).looks.is_blind
         self._deadline = unit.bus.now() + within
 
     def wait(self, seconds: float) -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 from drivebus import _native, checks, tables
 from drivebus.errors import LINE_ERRORS, PortError, Refused
 from drivebus.line.asking import Read, Write
+from drivebus.line.tasks import carried_out
 from drivebus.line.write_guard import check_words
 from drivebus.operations import events
 from drivebus.operations.aim import check_harmless
@@ -16,7 +18,7 @@ from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
 from drivebus.values import State
 
-__all__ = ["as_written", "explained", "read_words", "send", "write", "write_words"]
+__all__ = ["as_written", "carried_out_of", "explained", "read_words", "send", "write", "write_words"]
 
 _WRITE_ONE, _WRITE_MANY = 0x06, 0x10
 
@@ -145,6 +147,11 @@ async def send(
     if unit.taken is not None:
         unit.taken.writes += 1
     return is_confirmed
+
+
+async def carried_out_of(unit: DriveView, task: _native.Task) -> Any:
+    """What *task* comes to with *unit*, whose refusals say what this family means by them."""
+    return await carried_out(task, unit.bus, lambda: explained(unit))
 
 
 @contextmanager

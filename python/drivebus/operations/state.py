@@ -6,17 +6,17 @@ reason is kept: half of a status is better than none.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
+from drivebus._native import Looks
 from drivebus.errors import BadArgument
-from drivebus.line.asking import Read
 from drivebus.look import Look
 from drivebus.operations import events, raw_words, registers
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile.evidence import Evidence
-from drivebus.profile.plan import ReadPlan
+from drivebus.profile.profile import native_of
 from drivebus.values import Fault, State, Status
 
 __all__ = [
@@ -37,11 +37,10 @@ __all__ = [
 
 
 class _Plan(NamedTuple):
-    """What a look reads, worked out once for each profile."""
+    """What a look reads, worked out once for each profile and trust."""
 
-    plan: ReadPlan | None
+    looks: Looks
     state: str | None
-    words: Sequence[str]
     fault: str | None
     missing: Mapping[str, str]
 
@@ -54,7 +53,7 @@ async def look(unit: DriveView, *, urgent: bool = False, unverified: bool = Fals
     """
     unit = unit.trusting(unverified)
     seen = await glance(unit, urgent=urgent)
-    if planned(unit.evidence).plan is None:
+    if planned(unit.evidence).looks.is_blind:
         what = f"nothing of the state of unit {unit.address} may be read"
         raise unit.evidence.missing(what, seen.missing["state"], Evidence.without_state)
     return seen
@@ -63,30 +62,12 @@ async def look(unit: DriveView, *, urgent: bool = False, unverified: bool = Fals
 async def glance(unit: DriveView, *, urgent: bool = False) -> Look:
     """As `look`; where nothing may be read, nothing is, and nothing is told."""
     plan = planned(unit.evidence)
-    if plan.plan is None:
+    if plan.looks.is_blind:
         return Look(State.UNKNOWN, {}, None, 0.0, plan.missing, False, None)
-    answers: list[list[int]] = []
-    first = 0.0
-    for place, count in plan.plan.reads:
-        with raw_words.explained(unit):
-            came, time, _ = await unit.bus.ask_stamped(Read.at(unit.address, place, count, urgent=urgent))
-        first = first if answers else time
-        answers.append(came)
-    values = dict(zip(plan.plan.names, map(int, plan.plan.values(answers)), strict=True))
-    fields: dict[str, str] = {}
-    for word in plan.words:
-        fields.update(unit.profile.fields(word, values[word]))
-    told = None if plan.state is None else values[plan.state]
-    doing, number, in_fault = read_off(unit, told, None if plan.fault is None else values[plan.fault])
-    seen = Look(
-        doing,
-        fields,
-        unit.profile.fault(number) if number else None,
-        first,
-        plan.missing,
-        in_fault,
-        told,
-    )
+    told = await raw_words.carried_out_of(unit, plan.looks.look(unit.address, urgent))
+    doing, word, number, in_fault, fields, asked = told
+    fault = unit.profile.fault(number) if number else None
+    seen = Look(State(doing), dict(fields), fault, asked, plan.missing, in_fault, word)
     remember(unit, str(seen))
     events.saw(unit, seen.state, str(seen.fault or "not named") if seen.tripped else None)
     return seen
@@ -128,19 +109,10 @@ def planned(evidence: Evidence) -> _Plan:
 
 
 def _plan(evidence: Evidence) -> _Plan:
-    missing: dict[str, str] = {}
-    profile = evidence.profile
-    state, fault = profile.role("state"), profile.role("fault")
-    no_state, no_fault = evidence.without_state(), evidence.without_fault()
-    others = evidence.readable(word for word in profile.status_words if word != state)
-    if no_state is not None:
-        state, missing["state"] = None, no_state
-    if no_fault is not None:
-        fault, missing["fault"] = None, no_fault
-    names = [*([state] if state else []), *others, *([fault] if fault else [])]
-    in_status = [state] if state is not None and state in profile.status_words else []
-    plan = profile.compile(names) if names else None
-    return _Plan(plan, state, [*in_status, *others], fault, missing)
+    reasons = {"state": evidence.without_state(), "fault": evidence.without_fault()}
+    looks = Looks(native_of(evidence.profile), evidence.unverified)
+    missing = {what: reason for what, reason in reasons.items() if reason is not None}
+    return _Plan(looks, looks.state, looks.fault, missing)
 
 
 async def status(unit: DriveView, *, unverified: bool = False) -> Status:
@@ -232,12 +204,8 @@ def read_off(unit: DriveView, state: int | None, fault: int | None) -> tuple[Sta
 
     None is a word that is not known.
     """
-    profile = unit.profile
-    number = 0 if fault is None else profile.fault_number(fault)
-    if state is None:
-        return State.UNKNOWN, number, False
-    in_fault = profile.is_in_fault(state) or (number != 0 and not profile.state_tells_fault())
-    return state_of(unit, state), number, in_fault
+    doing, number, in_fault = planned(unit.evidence).looks.read_off(state, fault)
+    return State(doing), number, in_fault
 
 
 def state_word(unit: DriveView, what: str) -> str:

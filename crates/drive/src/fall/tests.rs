@@ -21,7 +21,7 @@ fn watch(fall: &mut Fall, (from, to): (u64, u64), setpoint: f64, hz: impl Fn(f64
     for asked in (from..=to).step_by(100) {
         let (middle, answered) = (asked + 4, at(asked + 8));
         fall.goes_on();
-        fall.see(Look { asked: at(asked), answered, hz: hz(f64::from(u32::try_from(middle).unwrap())), setpoint });
+        fall.see(Glimpse { asked: at(asked), answered, hz: hz(f64::from(u32::try_from(middle).unwrap())), setpoint });
     }
 }
 
@@ -182,7 +182,7 @@ fn no_number_is_too_odd() {
         for now in [Instant::ZERO, Instant::from_nanos(u64::MAX)] {
             let mut fall = Fall::new(now, Instant::ZERO, Duration::MAX);
             for asked in [now, Instant::ZERO, Instant::from_nanos(u64::MAX)] {
-                fall.see(Look { asked, answered: now, hz, setpoint });
+                fall.see(Glimpse { asked, answered: now, hz, setpoint });
                 fall.wait(Duration::MAX);
                 assert!(!fall.goes_along(slope), "{hz} {setpoint} {slope}");
             }
@@ -241,7 +241,7 @@ proptest! {
             let along = (middle - float(nanos(sent) + begin)).max(0.0) * slope;
             // The ramp goes on below zero here, where a motor would stand: nobody looks at that any more.
             let hz = setpoint - along + off;
-            fall.see(Look { asked: Instant::from_nanos(asked), answered: Instant::from_nanos(answered), hz, setpoint });
+            fall.see(Glimpse { asked: Instant::from_nanos(asked), answered: Instant::from_nanos(answered), hz, setpoint });
             seen.push((asked, answered, hz));
             now = answered;
         }
@@ -273,7 +273,7 @@ proptest! {
         let (mut now, mut last) = (CONFIRMED, 0.0);
         for each in hz {
             (now, last) = (now + 100, each);
-            fall.see(Look { asked: at(now), answered: at(now + 5), hz: each, setpoint: 60.0 });
+            fall.see(Glimpse { asked: at(now), answered: at(now + 5), hz: each, setpoint: 60.0 });
         }
         // Where the ramp of the stop would be by now, at its fastest and its slowest.
         let since = |begun: u64| f64::from(u32::try_from(now - begun).unwrap()) / 1e3;

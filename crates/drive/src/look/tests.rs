@@ -42,7 +42,7 @@ fn the_words_of_a_gd350() {
     let (look, asked) = looked("gd350", false, &[(0x2100, 1), (0x2101, 0x0001), (0x2102, 0)]);
     assert_eq!(asked, [0x2100, 0x2101, 0x2102].map(Place::from).into());
     assert_eq!((look.state, look.word, look.fault, look.is_tripped()), (State::Forward, Some(1), Some(0), false));
-    assert_eq!(look.fields.get("ready").map(String::as_str), Some("ready"));
+    assert_eq!(look.field("ready"), Some("ready"));
     assert_eq!(look.asked, Duration::from_secs(1));
     assert_eq!(look.to_string(), "forward");
 

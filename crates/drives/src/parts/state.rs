@@ -26,6 +26,15 @@ pub enum State {
 }
 
 impl State {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Forward, Self::Reverse, Self::Stopped, Self::Fault, Self::PowerOff, Self::PreExciting, Self::Unknown];
+
+    /// The state of that [`name`](Self::name).
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|state| state.name() == name)
+    }
+
     /// Whether the drive feeds the motor with the aim of turning it.
     pub const fn is_running(self) -> bool {
         matches!(self, Self::Forward | Self::Reverse)

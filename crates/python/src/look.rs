@@ -1,0 +1,118 @@
+//! `Looks` for Python: what a drive is doing, and how fast its motor turns.
+
+use std::sync::Arc;
+
+use drivebus_drive::task::Mailbox;
+use drivebus_drive::{self as drive, Look};
+use drivebus_drives::{Entry, State};
+use drivebus_rtu::UnitAddress;
+use pyo3::IntoPyObjectExt;
+use pyo3::prelude::*;
+
+use crate::convert::any_unit;
+use crate::errors::bad_argument;
+use crate::profile::Profile;
+use crate::task::{Failed, Task};
+
+/// What is looked at of units of one family, under one trust; see `python/drivebus/_native.pyi`.
+#[pyclass(frozen, module = "drivebus._native")]
+#[derive(Debug)]
+pub(crate) struct Looks {
+    looks: Arc<drive::Looks>,
+    speeds: Arc<drive::Speeds>,
+}
+
+/// A look: state, its word, the number of the fault, whether it is in it, the fields, and when that was.
+type Shown = (&'static str, Option<u16>, Option<u16>, bool, Vec<(String, String)>, f64);
+
+#[pymethods]
+impl Looks {
+    #[new]
+    #[pyo3(signature = (profile, trusted, /))]
+    fn new(profile: &Profile, trusted: bool) -> Self {
+        let profile = profile.core();
+        let speeds = drive::Speeds::new(&profile, trusted);
+        Self { looks: Arc::new(drive::Looks::new(&profile, trusted)), speeds: Arc::new(speeds) }
+    }
+
+    #[getter]
+    fn is_blind(&self) -> bool {
+        self.looks.is_blind()
+    }
+
+    #[getter]
+    fn state(&self) -> Option<&str> {
+        self.looks.state_word().map(Entry::name)
+    }
+
+    #[getter]
+    fn fault(&self) -> Option<&str> {
+        self.looks.fault_register().map(Entry::name)
+    }
+
+    #[pyo3(signature = (state, fault, /))]
+    fn read_off(&self, state: Option<u16>, fault: Option<u16>) -> (&'static str, u16, bool) {
+        let profile = self.looks.profile();
+        let number = fault.map(|raw| profile.fault_number(raw));
+        let doing = state.map_or(State::Unknown, |raw| profile.state(raw));
+        (doing.name(), number.unwrap_or_default(), self.looks.is_in_fault(state, number))
+    }
+
+    #[pyo3(signature = (unit, urgent, /))]
+    fn look(&self, unit: &Bound<'_, PyAny>, urgent: bool) -> PyResult<Task> {
+        let unit = any_unit(unit)?;
+        let looks = Arc::clone(&self.looks);
+        Ok(Task::of(
+            |line| async move { looks.look(&line, unit, urgent).await },
+            |py, look: Result<Look, Failed>| shown(look?).into_py_any(py),
+        ))
+    }
+
+    #[pyo3(signature = (unit, urgent, /))]
+    fn frequencies(&self, unit: &Bound<'_, PyAny>, urgent: bool) -> PyResult<Task> {
+        self.asked(unit, async move |speeds, line, unit| {
+            let told = speeds.frequencies(&line, unit, urgent).await?;
+            Ok(told.map(|told| (told.output, told.setpoint)))
+        })
+    }
+
+    #[pyo3(signature = (unit, urgent, /))]
+    fn output_frequency(&self, unit: &Bound<'_, PyAny>, urgent: bool) -> PyResult<Task> {
+        self.asked(unit, async move |speeds, line, unit| speeds.output(&line, unit, urgent).await)
+    }
+
+    #[pyo3(signature = (unit, state, urgent, /))]
+    fn turns_in_spite_of(&self, unit: &Bound<'_, PyAny>, state: &str, urgent: bool) -> PyResult<Task> {
+        let state = State::named(state).ok_or_else(|| bad_argument(format!("state {state:?} is none")))?;
+        self.asked(unit, async move |speeds, line, unit| speeds.turns_in_spite_of(state, &line, unit, urgent).await)
+    }
+
+    #[pyo3(signature = (unit, urgent, /))]
+    fn ramp(&self, unit: &Bound<'_, PyAny>, urgent: bool) -> PyResult<Task> {
+        self.asked(unit, async move |speeds, line, unit| {
+            let ramp = speeds.ramp(&line, unit, urgent).await?;
+            Ok((ramp.slope, ramp.only_by_bus))
+        })
+    }
+}
+
+impl Looks {
+    fn asked<T, F>(
+        &self,
+        unit: &Bound<'_, PyAny>,
+        operation: impl FnOnce(Arc<drive::Speeds>, Mailbox<Failed>, UnitAddress) -> F,
+    ) -> PyResult<Task>
+    where
+        T: for<'py> IntoPyObject<'py> + Send + 'static,
+        F: Future<Output = Result<T, Failed>> + Send + 'static,
+    {
+        let unit = any_unit(unit)?;
+        let speeds = Arc::clone(&self.speeds);
+        Ok(Task::of(|line| operation(speeds, line, unit), |py, told: Result<T, Failed>| told?.into_py_any(py)))
+    }
+}
+
+fn shown(look: Look) -> Shown {
+    let Look { state, word, fault, is_in_fault, fields, asked, .. } = look;
+    (state.name(), word, fault, is_in_fault, fields, asked.as_secs_f64())
+}
