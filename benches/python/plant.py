@@ -33,6 +33,7 @@ from benches.python.figures import markdown, show
 from paho.mqtt.enums import CallbackAPIVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
+from psycopg.errors import UndefinedTable
 from tests.python.mqtt_broker import Broker, broker
 from tests.python.postgres_server import Server, server
 from tests.python.test_sparkplug import Listener
@@ -205,14 +206,17 @@ def until_all_is_in(gateways: Sequence[Gateway], postgres: Server, most: float) 
 
     How long that took, and how old meanwhile the newest sample in PostgreSQL was at most, in seconds.
     """
-    begun, oldest = time.monotonic(), 0.0
+    begun, oldest, has_begun = time.monotonic(), 0.0, False
     while time.monotonic() < begun + most:
         outlets = [each for of in gateways for each in status(of.folder).get("outlets", {}).values()]
         sinks = [each for each in outlets if "behind" in each]
         if len(sinks) >= 2 * len(gateways) and all(each["connected"] and each["behind"] < 2_000 for each in sinks):
             break
-        [(age,)] = postgres.ask(NEWEST)
-        oldest = max(oldest, float(age))
+        # It has made no table yet, or has not told a sample of now.
+        with suppress(UndefinedTable):
+            [(age,)] = postgres.ask(NEWEST)
+            has_begun = has_begun or age < 60
+            oldest = max(oldest, float(age)) if has_begun else 0.0
         time.sleep(0.5)
     return {"caught_up_s": time.monotonic() - begun, "newest_at_most_s": oldest}
 
