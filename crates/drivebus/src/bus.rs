@@ -285,7 +285,7 @@ impl Bus {
         crate::aio::Bus::from(self.clone())
     }
 
-    fn call(
+    pub(crate) fn call(
         &self,
         to: Destination,
         request: &Request<'_>,

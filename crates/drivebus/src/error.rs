@@ -32,7 +32,12 @@ pub struct Error {
 impl Error {
     /// Nothing was sent.
     pub(crate) fn not_allowed(why: impl fmt::Display) -> Self {
-        Self { kind: ErrorKind::NotAllowed, message: why.to_string(), call: None }
+        Self::of(ErrorKind::NotAllowed, why)
+    }
+
+    /// An error of this kind, of no one call.
+    pub(crate) fn of(kind: ErrorKind, why: impl fmt::Display) -> Self {
+        Self { kind, message: why.to_string(), call: None }
     }
 
     /// What kind of failure it is, and so by whose fault.

@@ -53,8 +53,8 @@
 //!
 //! # Limits
 //!
-//! - It has words and values, and no operations of a drive: what runs, stops and proves that it stopped is in the Python
-//!   package. A program that moves motors from here writes the words and confirms them itself.
+//! - It finds out what a unit is and what it does, and moves nothing: what runs, stops and proves that it stopped is in the
+//!   Python package. A program that moves motors from here writes the words and confirms them itself.
 //! - It is no safety function. An emergency stop is a wire.
 
 #![forbid(unsafe_code)]
@@ -64,6 +64,7 @@ mod builder;
 mod bus;
 mod checks;
 mod error;
+mod operations;
 mod options;
 mod payload;
 mod poll;

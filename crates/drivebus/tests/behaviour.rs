@@ -3,10 +3,15 @@
 #![cfg(feature = "sim")]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+use std::sync::Arc;
 use std::time::Duration;
 
+use drivebus::drive::task::{Mailbox, Read, Task};
+use drivebus::drive::{Certainty, Looks};
 use drivebus::drives::{Command, State};
-use drivebus::{AdapterEcho, Bus, CallOptions, ErrorKind, Profile, Reading, Target, UnitOptions};
+use drivebus::rtu::UnitAddress;
+use drivebus::sim::Refusals;
+use drivebus::{AdapterEcho, Bus, CallOptions, Error, ErrorKind, Profile, Reading, Target, UnitOptions};
 
 const LINE: &str = "sim://1=gd350,2=vfd500?clock=virtual&seed=1";
 
@@ -98,7 +103,7 @@ fn a_poll_brings_samples_of_values_and_of_words() {
 #[test]
 fn what_cannot_be_asked_is_refused_before_anything_is_sent() {
     let bus = bus();
-    let refused = |error: drivebus::Error, message: &str| {
+    let refused = |error: Error, message: &str| {
         assert_eq!((error.kind(), error.to_string()), (ErrorKind::NotAllowed, message.to_owned()));
         assert!(!error.may_have_acted());
     };
@@ -164,4 +169,66 @@ fn an_error_says_whose_fault_it_is_and_whether_the_drive_took_it() {
     bus.close();
     let closed = bus.read(1, 0, 1).unwrap_err();
     assert_eq!((closed.kind(), closed.to_string().ends_with("the bus is closed")), (ErrorKind::Port, true));
+}
+
+/// Of a family that nothing tells from others nobody says that it is one of them alone.
+#[test]
+fn a_unit_is_found_for_what_it_is() {
+    let mut certain = 0;
+    for name in Profile::builtin_names() {
+        let bus = Bus::open(&format!("sim://{name}?clock=virtual&seed=1")).unwrap();
+        let found = bus.identify(1).unwrap();
+        let profile = Profile::builtin(name).unwrap();
+        let is_it = found.candidates.iter().any(|each| each == profile.name() || profile.reports_as().contains(each));
+        assert!(is_it || found.candidates.is_empty(), "{name}: {found}");
+        certain += usize::from(found.certainty == Certainty::Certain);
+    }
+    assert!(certain >= 4, "{certain}");
+    let silent = bus().identify(9).unwrap_err();
+    assert_eq!((silent.kind(), silent.may_have_acted()), (ErrorKind::NoAnswer, true));
+    assert_eq!(bus().identify(0).unwrap_err().kind(), ErrorKind::NotAllowed);
+}
+
+#[test]
+fn a_unit_that_is_always_busy_does_not_say_what_it_is() {
+    let bus = bus();
+    bus.simulator().unwrap().drive(1).unwrap().refuse(Refusals::new(0x06)).unwrap();
+    let busy = bus.identify(1).unwrap_err();
+    assert_eq!(busy.kind(), ErrorKind::BadAnswer);
+    assert!(busy.to_string().starts_with("unit 1 is busy, or gets requests damaged: it refused "), "{busy}");
+}
+
+#[test]
+fn a_look_shows_what_a_drive_does() {
+    let (bus, gd350) = (bus(), Profile::builtin("gd350").unwrap());
+    let looks = Arc::new(Looks::new(&gd350, false));
+    let before = bus.look(1, &looks).unwrap();
+    assert_eq!((before.state, before.is_tripped()), (State::Stopped, false));
+    for (address, word) in [(0x8001, 2), (0x8006, 8), (0x2001, 1_000), (0x2000, 1)] {
+        bus.write(1, address, word).unwrap();
+    }
+    let now = bus.look(1, &looks).unwrap();
+    assert_eq!((now.state, now.word, now.to_string().as_str()), (State::Forward, Some(1), "forward"));
+    assert!(now.asked >= before.asked);
+    // At this address is a VFD500, which refuses what a GD350 has there.
+    assert_eq!(bus.look(2, &looks).unwrap_err().kind(), ErrorKind::Refused);
+}
+
+/// A task of one's own: what an operation may not do is told, and nothing panics.
+#[test]
+fn an_operation_of_ones_own_is_carried_out() {
+    let bus = bus();
+    let unit = UnitAddress::new(1).unwrap();
+    let twice = bus.carry_out(Task::new(async move |line: Mailbox<Error>| {
+        let first = line.read(Read::word(unit, 0x2103.into())).await?;
+        line.sleep(Duration::from_secs(1)).await?;
+        Ok((first, line.read_stamped(Read::words(unit, 0x2100.into(), 2).urgent(true)).await?.words.len(), line.now()))
+    }));
+    let (first, count, now) = twice.unwrap();
+    assert_eq!((first, count), (vec![0x01A0], 2));
+    assert!(now.as_nanos() > 1_000_000_000);
+    let stuck = bus.carry_out(Task::<Result<(), _>, _>::new(async |_| std::future::pending().await));
+    assert_eq!(stuck.unwrap_err().kind(), ErrorKind::NotAllowed);
+    let too_many = Task::new(async move |line: Mailbox<Error>| line.read(Read::words(unit, 0.into(), 500)).await);
+    assert_eq!(bus.carry_out(too_many).unwrap_err().kind(), ErrorKind::NotAllowed);
 }

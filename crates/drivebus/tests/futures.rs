@@ -5,13 +5,17 @@
 
 use std::future::Future;
 use std::pin::Pin;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
+use drivebus::drive::Looks;
+use drivebus::drive::task::{Mailbox, Task};
+use drivebus::drives::State;
 use drivebus::line::{Line, LineClock, PortError};
 use drivebus::sim::{Options, SimLine, Simulator};
-use drivebus::{AdapterEcho, Bus, ErrorKind, Instant, Profile, Reading, Target, aio};
+use drivebus::{AdapterEcho, Bus, Error, ErrorKind, Instant, Profile, Reading, Target, aio};
 
 const ACCELERATION: u16 = 0x800B; // P00.11 in RAM
 
@@ -162,4 +166,25 @@ fn a_call_is_a_future_that_may_go_anywhere() {
     let bus = Bus::open("sim://gd350?clock=virtual").unwrap().aio();
     anywhere(&bus.read(1, 0x2103, 1));
     anywhere(&bus.write(1, ACCELERATION, vec![1]));
+    anywhere(&async move { bus.identify(1).await });
+}
+
+#[tokio::test]
+async fn operations_are_futures_too() {
+    let bus = aio::Bus::open("sim://1=gd350,2=vfd500?clock=virtual&seed=1").await.unwrap();
+    let (first, second) = tokio::join!(bus.identify(1), bus.identify(2));
+    assert_eq!(first.unwrap(), bus.blocking().identify(1).unwrap());
+    assert_eq!(second.unwrap(), bus.blocking().identify(2).unwrap());
+    let looks = Arc::new(Looks::new(&Profile::builtin("gd350").unwrap(), false));
+    let look = bus.look(1, &looks).await.unwrap();
+    assert_eq!(look.state, State::Stopped);
+    assert!(!look.asked.is_zero());
+    assert_eq!(bus.identify(9).await.unwrap_err().kind(), ErrorKind::NoAnswer);
+    assert_eq!(bus.identify(0).await.unwrap_err().kind(), ErrorKind::NotAllowed);
+    let slept = bus.carry_out(Task::new(async |line: Mailbox<Error>| {
+        let began = line.now();
+        line.sleep(Duration::from_secs(2)).await?;
+        Ok(line.now().saturating_duration_since(began))
+    }));
+    assert!(slept.await.unwrap() >= Duration::from_secs(2));
 }

@@ -1,11 +1,14 @@
 //! The bus whose calls are futures.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use drivebus_drive::task::{Outcome, Read, Step, Task, Wish};
+use drivebus_drive::{Identification, Look, Looks};
 use drivebus_drives::Place;
 use drivebus_line::{CallOptions as LineOptions, Reply, Stats};
-use drivebus_rtu::{Destination, Request};
+use drivebus_rtu::{Destination, Instant, Request};
 
 use super::asked::Asked;
 use super::poll::Poll;
@@ -13,6 +16,7 @@ use crate::builder::Builder;
 use crate::bus::once;
 use crate::checks;
 use crate::error::Error;
+use crate::operations;
 use crate::options::CallOptions;
 use crate::payload::Payload;
 use crate::poll::Target;
@@ -118,6 +122,54 @@ impl Bus {
             words.extend(came);
         }
         Ok(reading.values(&words))
+    }
+
+    /// Finds out what `unit` is: as [`Bus::identify`](crate::Bus::identify).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Bus::identify`](crate::Bus::identify).
+    pub async fn identify(&self, unit: u8) -> Result<Identification, Error> {
+        self.carry_out(operations::identify(unit)?).await
+    }
+
+    /// Looks at `unit`: as [`Bus::look`](crate::Bus::look).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Bus::look`](crate::Bus::look).
+    pub async fn look(&self, unit: u8, looks: &Arc<Looks>) -> Result<Look, Error> {
+        self.carry_out(operations::look(unit, looks)?).await
+    }
+
+    /// Carries an operation out: as [`Bus::carry_out`](crate::Bus::carry_out). Where this future is dropped, it ends where it
+    /// stands.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Bus::carry_out`](crate::Bus::carry_out).
+    pub async fn carry_out<T>(&self, mut task: Task<Result<T, Error>, Error>) -> Result<T, Error> {
+        let (mut latest, mut outcome) = (Instant::ZERO, None);
+        loop {
+            let seen = self.0.seen(&mut latest);
+            outcome = Some(match task.step(seen, outcome)? {
+                Step::Done(done) => return done,
+                Step::Wish(Wish::Sleep(time)) => {
+                    self.sleep(time).await.map_or_else(Outcome::Failed, |()| Outcome::Slept)
+                }
+                Step::Wish(Wish::Read(read)) => self.came_of(read).await.unwrap_or_else(Outcome::Failed),
+                Step::Wish(wish) => return Err(Error::not_allowed(format!("no bus knows how to do {wish}"))),
+            });
+        }
+    }
+
+    fn came_of(&self, read: Read) -> Asked<Outcome<Error>> {
+        let checked = || {
+            let request = checks::read(read.place, read.count)?;
+            Ok((read.unit.into(), request, operations::options_of(&read).of(&request)?))
+        };
+        let bus = self.0.clone();
+        self.ask(checked(), move |reply| bus.outcome_of(&read, replies::words_of(&reply, read.count), &reply.done))
     }
 
     /// Asks `targets` again and again: as [`Bus::poll`](crate::Bus::poll).
