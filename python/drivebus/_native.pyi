@@ -707,9 +707,6 @@ def code_rows(place: int, word: int, /) -> list[dict[str, Any]]:
 def listed_codes() -> list[int]:
     """Every code that a shipped profile lists."""
 
-def passes(answer: _Answer, /) -> bool:
-    """Whether *answer* is a refusal that passes, whatever the unit is."""
-
 _Undefined: TypeAlias = tuple[Literal["undefined"], str, int, int, dict[int, str]]
 _Foreign: TypeAlias = tuple[Literal["foreign"], str, int, int | None, list[str]]
 
