@@ -19,7 +19,7 @@ use crate::family::Family;
 use crate::harm::What;
 use crate::huanyang::may_be_of;
 use crate::same_unit::SameUnit;
-use crate::task::{Cause, LineError, Mailbox, Read};
+use crate::task::{LineError, Mailbox, Read};
 
 /// For so long a unit is given to answer what is asked before a halt, and the halt itself.
 pub const ANSWER_WITHIN: Duration = Duration::from_millis(100);
@@ -119,7 +119,7 @@ impl Aim {
             let read = Read::word(unit, place).urgent(true).once_within(ANSWER_WITHIN);
             let answer = match answer_once(line, read).await {
                 Ok(answer) => answer,
-                Err(error) if !matches!(error.cause(), Cause::NoAnswer | Cause::BadAnswer) => {
+                Err(error) if !error.cause().is_no_answer() => {
                     return Err(NotTaken::NotTold(NotTold::Failed(error)));
                 }
                 Err(error) if may_be_of(unit, error.raw()) => {

@@ -15,7 +15,7 @@ use crate::asked::{NotTold, answer_at, is_unreached};
 use crate::families::Families;
 use crate::family::Family;
 use crate::signatures::{Asked, shown_by, wanted};
-use crate::task::{Cause, LineError, Mailbox, Read};
+use crate::task::{LineError, Mailbox, Read};
 
 /// How sure it is what a unit is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -208,7 +208,7 @@ async fn as_it_behaves<E: LineError>(
     };
     let answer = match answer_at(line, Read::word(found.unit, place)).await {
         Ok(answer) => answer,
-        Err(error) if matches!(error.cause(), Cause::NoAnswer | Cause::BadAnswer) => return Ok(found),
+        Err(error) if error.cause().is_no_answer() => return Ok(found),
         Err(error) => return Err(error),
     };
     let is_none = match answer.said {

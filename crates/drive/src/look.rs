@@ -8,7 +8,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use drivebus_drives::{Entry, Fault, Profile, ReadPlan, State};
+use drivebus_drives::{BitField, Entry, Fault, Profile, ReadPlan, State};
 use drivebus_rtu::UnitAddress;
 
 use crate::rule::{Rule, WhyNot};
@@ -26,11 +26,11 @@ pub struct Looks {
 }
 
 /// A word of a look.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug)]
 struct Word {
     role: Role,
-    /// Which of the profile's status words it is, where its bits tell more.
-    status_word: Option<usize>,
+    /// Those of its bits that tell more than the word itself.
+    bits: Vec<BitField>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,26 +93,26 @@ impl fmt::Display for Look {
 impl Looks {
     /// Looks at units of `profile`; where `is_trusted`, also by what no document of the family prints.
     pub fn new(profile: &Arc<Profile>, is_trusted: bool) -> Self {
-        let rule = rule_of(profile, is_trusted);
+        let rule = Rule::of(profile, is_trusted);
+        let is = |one: &Entry, other: &Entry| one.name() == other.name();
         let register = profile.role("state");
-        let state = register.filter(|_| rule.state().is_ok());
-        let fault = profile.role("fault").filter(|_| rule.fault().is_ok());
-        let is = |one: Option<&Entry>, other: &Entry| one.is_some_and(|one| one.name() == other.name());
-        let bits: Vec<_> = profile.status_words().enumerate().collect();
-        let mut words = Vec::new();
         let mut entries = Vec::new();
-        if let Some(state) = state {
-            let status_word = bits.iter().find(|(_, word)| is(Some(state), word)).map(|&(index, _)| index);
-            words.push(Word { role: Role::State, status_word });
-            entries.push(state);
+        let mut words = Vec::new();
+        let mut reads = |entry, role, bits: &[BitField]| {
+            entries.push(entry);
+            words.push(Word { role, bits: bits.to_vec() });
+        };
+        if let Some(state) = register.filter(|_| rule.state().is_ok()) {
+            let tells_more = profile.status_words().any(|word| is(word, state));
+            reads(state, Role::State, if tells_more { state.bits() } else { &[] });
         }
-        for (index, word) in bits.into_iter().filter(|(_, word)| !is(register, word) && rule.read(word).is_ok()) {
-            words.push(Word { role: Role::Bits, status_word: Some(index) });
-            entries.push(word);
+        for word in profile.status_words().filter(|word| rule.read(word).is_ok()) {
+            if register.is_none_or(|state| !is(word, state)) {
+                reads(word, Role::Bits, word.bits());
+            }
         }
-        if let Some(fault) = fault {
-            words.push(Word { role: Role::Fault, status_word: None });
-            entries.push(fault);
+        if let Some(fault) = profile.role("fault").filter(|_| rule.fault().is_ok()) {
+            reads(fault, Role::Fault, &[]);
         }
         // What may be read can be.
         let plan = if entries.is_empty() { None } else { profile.compile(&entries).ok() };
@@ -145,7 +145,7 @@ impl Looks {
     ///
     /// Those of [`Rule::state`].
     pub fn state(&self) -> Result<(), WhyNot<'_>> {
-        rule_of(&self.profile, self.is_trusted).state()
+        Rule::of(&self.profile, self.is_trusted).state()
     }
 
     /// Whether the present fault of its units may be read.
@@ -154,7 +154,7 @@ impl Looks {
     ///
     /// Those of [`Rule::fault`].
     pub fn fault(&self) -> Result<(), WhyNot<'_>> {
-        rule_of(&self.profile, self.is_trusted).fault()
+        Rule::of(&self.profile, self.is_trusted).fault()
     }
 
     /// Looks at `unit`, before all who wait for the line where it `is_urgent`. Where nothing may be read, nothing is asked.
@@ -185,10 +185,7 @@ impl Looks {
                 Role::Fault => fault = Some(self.profile.fault_number(raw)),
                 Role::Bits => {}
             }
-            let bits = word.status_word.and_then(|index| self.profile.status_words().nth(index));
-            for field in bits.into_iter().flat_map(Entry::bits) {
-                fields.push((field.name().to_owned(), field.meaning(raw).into_owned()));
-            }
+            fields.extend(word.bits.iter().map(|field| (field.name().to_owned(), field.meaning(raw).into_owned())));
         }
         Look {
             state: state.map_or(State::Unknown, |raw| self.profile.state(raw)),
@@ -205,10 +202,6 @@ impl Looks {
         let is_numbered = fault.is_some_and(|number| number != 0) && !self.profile.state_tells_fault();
         word.is_some_and(|raw| self.profile.is_in_fault(raw) || is_numbered)
     }
-}
-
-fn rule_of(profile: &Profile, is_trusted: bool) -> Rule<'_> {
-    if is_trusted { Rule::trusting(profile) } else { Rule::printed(profile) }
 }
 
 #[cfg(test)]

@@ -46,12 +46,17 @@ fn told(reason: &str) -> String {
 impl<'p> Rule<'p> {
     /// What documents of the family print may be used, and what they print in part may be read.
     pub const fn printed(profile: &'p Profile) -> Self {
-        Self { profile, trusts_all: false }
+        Self::of(profile, false)
     }
 
     /// All that the profile knows may be used, whatever proves it: for who knows the drive, and says so.
     pub const fn trusting(profile: &'p Profile) -> Self {
-        Self { profile, trusts_all: true }
+        Self::of(profile, true)
+    }
+
+    /// As [`trusting`](Self::trusting) where it `is_trusted`, else as [`printed`](Self::printed).
+    pub const fn of(profile: &'p Profile, is_trusted: bool) -> Self {
+        Self { profile, trusts_all: is_trusted }
     }
 
     /// Whether `entry` may be read.

@@ -8,7 +8,7 @@ use drivebus_drives::{Place, Signature};
 use crate::asked::{NotTold, answer_at};
 use crate::families::Families;
 use crate::family::Family;
-use crate::task::{Cause, LineError, Mailbox, Read};
+use crate::task::{LineError, Mailbox, Read};
 
 /// Which words a unit answered, and which it refused.
 pub(crate) type Asked = BTreeMap<Place, bool>;
@@ -50,7 +50,7 @@ async fn is_shown<E: LineError>(
             None => match answer_at(line, Read { place, ..read }).await {
                 Ok(answer) if answer.passes() => return Ok(false),
                 Ok(answer) => *asked.entry(place).or_insert(answer.word().is_some()),
-                Err(NotTold::Failed(error)) if !matches!(error.cause(), Cause::NoAnswer | Cause::BadAnswer) => {
+                Err(NotTold::Failed(error)) if !error.cause().is_no_answer() => {
                     return Err(error);
                 }
                 // Neither, then: no signature has it.

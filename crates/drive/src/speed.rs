@@ -58,7 +58,7 @@ pub struct Ramp {
 impl Speeds {
     /// What units of `profile` tell; where `is_trusted`, also by what no document of the family prints.
     pub fn new(profile: &Arc<Profile>, is_trusted: bool) -> Self {
-        let rule = if is_trusted { Rule::trusting(profile) } else { Rule::printed(profile) };
+        let rule = Rule::of(profile, is_trusted);
         let readable = |entry: &Entry| rule.read(entry).is_ok();
         let of_role = |role: &str| profile.role(role).filter(|entry| readable(entry));
         let (frequency, setpoint) = (of_role("frequency"), of_role("setpoint"));

@@ -22,7 +22,7 @@ type Told = Option<(&'static str, String)>;
 
 impl Rule {
     fn core(&self) -> Core<'_> {
-        if self.trusts_all { Core::trusting(&self.profile) } else { Core::printed(&self.profile) }
+        Core::of(&self.profile, self.trusts_all)
     }
 }
 

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::same_unit::Identity;
 use crate::scripted::{Fault, Reply, Script, UNIT, any_family, any_reply, fails, like, refuses, shipped};
+use crate::task::Cause;
 
 const STOP: What = What::Command(Command::Stop);
 

@@ -3,6 +3,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::scripted::{Fault, Reply, Script, UNIT, any_reply, fails, like, refuses, shipped};
+use crate::task::Cause;
 
 /// Where units keep their codes.
 const CODE: u32 = 0x2103;

@@ -31,8 +31,13 @@ pub enum Cause {
 }
 
 impl Cause {
+    /// Whether no answer came that counts, while the port stayed: silence, or bytes that are none.
+    pub const fn is_no_answer(self) -> bool {
+        matches!(self, Self::NoAnswer | Self::BadAnswer)
+    }
+
     /// Whether the line failed: the unit did not say anything that counts.
     pub const fn is_of_the_line(self) -> bool {
-        matches!(self, Self::NoAnswer | Self::BadAnswer | Self::Port)
+        self.is_no_answer() || matches!(self, Self::Port)
     }
 }
