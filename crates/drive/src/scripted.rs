@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use crate::families::Families;
 use crate::family::Family;
-use crate::task::{Cause, LineError, Mailbox, Outcome, Read, Seen, Step, Task, Wish};
+use crate::task::{Cause, LineError, Mailbox, Outcome, Read, Seen, Stamped, Step, Task, Wish};
 
 /// Who is asked.
 pub(crate) const UNIT: UnitAddress = UnitAddress::by_name(5);
@@ -63,6 +63,14 @@ pub(crate) fn like<'f>(family: &'f Family, words: &'f [(u16, u16)]) -> impl FnMu
     }
 }
 
+/// A unit that has `words`, and 0 everywhere else.
+pub(crate) fn zeros_but(words: &[(u16, u16)]) -> impl FnMut(Read) -> Reply + '_ {
+    |read| {
+        let word = words.iter().find(|(address, _)| Place::from(*address) == read.place);
+        Ok(word.map_or(0, |&(_, word)| word))
+    }
+}
+
 /// The line of one test: its time, how often it was opened again, and what was asked.
 #[derive(Debug)]
 pub(crate) struct Script {
@@ -76,7 +84,7 @@ impl Script {
         Self { now: Instant::ZERO, connection: 0, asked: Vec::new() }
     }
 
-    /// What the operation comes to where `unit` is asked. Each question takes a millisecond; none is asked without end.
+    /// What the operation comes to where `unit` is asked, for each word of a read. Each question takes a millisecond; none is asked without end.
     pub(crate) fn carry_out<T, F>(
         &mut self,
         mut unit: impl FnMut(Read) -> Reply,
@@ -95,8 +103,19 @@ impl Script {
                 Step::Wish(Wish::Read(read)) => {
                     self.asked.push(read);
                     assert!(self.asked.len() < 400, "it asks without end");
+                    let asked = self.now;
                     self.now = self.now + Duration::from_millis(1);
-                    Some(unit(read).map_or_else(Outcome::Failed, |word| Outcome::Words(vec![word])))
+                    let places = (read.place.address..=u16::MAX).take(read.count.into());
+                    let words = places.map(|address| unit(Read { place: Place { address, ..read.place }, ..read }));
+                    Some(match words.collect() {
+                        Err(fault) => Outcome::Failed(fault),
+                        Ok(words) if read.is_stamped => Outcome::Stamped(Stamped {
+                            words,
+                            asked: since_start(asked),
+                            answered: since_start(self.now),
+                        }),
+                        Ok(words) => Outcome::Words(words),
+                    })
                 }
                 Step::Wish(wish) => panic!("it wants {wish}"),
             };
@@ -107,6 +126,10 @@ impl Script {
     pub(crate) fn places(&self) -> Vec<u32> {
         self.asked.iter().map(|read| read.place.number()).collect()
     }
+}
+
+fn since_start(moment: Instant) -> Duration {
+    moment.saturating_duration_since(Instant::ZERO)
 }
 
 /// The shipped family of this name.

@@ -4,7 +4,7 @@ use drivebus_drives::Place;
 use drivebus_rtu::Instant;
 
 use super::*;
-use crate::task::{Outcome, Seen, Stamped, Step, Task, Wish};
+use crate::scripted::{Script, UNIT, zeros_but};
 
 fn builtin(name: &str) -> Arc<Profile> {
     Profile::builtin(name).unwrap()
@@ -13,27 +13,12 @@ fn builtin(name: &str) -> Arc<Profile> {
 /// The look at a unit that answers with these `words` by place, and the places that it was asked for.
 fn looked(name: &str, is_trusted: bool, words: &[(u16, u16)]) -> (Look, BTreeSet<Place>) {
     let looks = Looks::new(&builtin(name), is_trusted);
-    let mut task: Task<Result<Look, ()>, ()> =
-        Task::new(async move |line| looks.look(&line, UnitAddress::MIN, true).await);
-    let seen = Seen { now: Instant::ZERO, connection: 0, is_closed: false };
-    let (mut outcome, mut asked, mut second) = (None, BTreeSet::new(), 0);
-    loop {
-        outcome = match task.step(seen, outcome).unwrap() {
-            Step::Done(look) => return (look.unwrap(), asked),
-            Step::Wish(Wish::Read(read)) => {
-                assert!(read.is_urgent && read.is_stamped, "{read:?}");
-                second += 1;
-                let first = read.place.address;
-                let places: Vec<_> = (first..first + read.count).collect();
-                asked.extend(places.iter().map(|&address| Place::from(address)));
-                let word =
-                    |address: &u16| words.iter().find(|(known, _)| known == address).map_or(0, |&(_, word)| word);
-                let (asked, answered) = (Duration::from_secs(second), Duration::from_secs(second));
-                Some(Outcome::Stamped(Stamped { words: places.iter().map(word).collect(), asked, answered }))
-            }
-            Step::Wish(wish) => panic!("{wish}"),
-        };
-    }
+    let mut script = Script::new();
+    script.now = Instant::ZERO + Duration::from_secs(1);
+    let look = script.carry_out(zeros_but(words), async move |line| looks.look(&line, UNIT, true).await);
+    assert!(script.asked.iter().all(|read| read.is_urgent && read.is_stamped), "{:?}", script.asked);
+    let asked = script.asked.iter().flat_map(|read| (read.place.address..).take(read.count.into())).map(Place::from);
+    (look.unwrap(), asked.collect())
 }
 
 /// GD350 operation manual, section 9.4.5: 2100H is the state, 2101H has bits, 2102H the fault code.

@@ -1,56 +1,26 @@
-use drivebus_drives::Place;
-use drivebus_rtu::{ExceptionCode, Instant, Meaning};
+use drivebus_rtu::{ExceptionCode, Meaning};
 
 use super::*;
-use crate::task::{Outcome, Seen, Step, Task, Wish};
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Failed(Cause);
-
-impl LineError for Failed {
-    fn cause(&self) -> Cause {
-        self.0
-    }
-
-    fn raw(&self) -> &[u8] {
-        &[]
-    }
-
-    fn was_sent(&self) -> bool {
-        true
-    }
-}
+use crate::scripted::{Fault, Script, UNIT, fails, zeros_but};
 
 fn of(name: &str) -> Arc<Speeds> {
     Arc::new(Speeds::new(&Profile::builtin(name).unwrap(), false))
 }
 
-/// What `task` comes to where the unit has these words, and nothing but zeros elsewhere.
-fn done<T>(mut task: Task<T, Failed>, words: &[(u16, u16)]) -> T {
-    let seen = Seen { now: Instant::ZERO, connection: 0, is_closed: false };
-    let mut outcome = None;
-    loop {
-        outcome = match task.step(seen, outcome).unwrap() {
-            Step::Done(done) => return done,
-            Step::Wish(Wish::Read(read)) => {
-                let word = |place: Place| {
-                    let it = words.iter().find(|(known, _)| place == Place::from(*known));
-                    it.map_or(0, |&(_, word)| word)
-                };
-                let places = (0..read.count).map(|offset| Place::new(read.place.table, read.place.address + offset));
-                Some(Outcome::Words(places.map(word).collect()))
-            }
-            Step::Wish(wish) => panic!("{wish}"),
-        };
-    }
+/// What the operation comes to where the unit has these words, and nothing but zeros elsewhere.
+fn done<T, F>(operation: impl FnOnce(Mailbox<Fault>) -> F, words: &[(u16, u16)]) -> T
+where
+    F: Future<Output = T> + Send + 'static,
+{
+    Script::new().carry_out(zeros_but(words), operation)
 }
 
 /// GD350 operation manual, section 9.4.5: 3000H is the running frequency, 3001H the setpoint, both in hundredths.
 #[test]
 fn the_frequencies_of_a_gd350() {
     let speeds = of("gd350");
-    let task = Task::new(async move |line| speeds.frequencies(&line, UnitAddress::MIN, true).await);
-    let frequencies = done(task, &[(0x3000, 1234), (0x3001, 5000)]).unwrap();
+    let told = done(async move |line| speeds.frequencies(&line, UNIT, true).await, &[(0x3000, 1234), (0x3001, 5000)]);
+    let frequencies = told.unwrap();
     assert_eq!(frequencies, Some(Frequencies { output: 12.34, setpoint: Some(50.0) }));
 }
 
@@ -60,7 +30,7 @@ fn the_frequencies_of_a_gd350() {
 fn the_ramp_of_a_gd350() {
     let ramp = |words: &[(u16, u16)]| {
         let speeds = of("gd350");
-        done(Task::new(async move |line| speeds.ramp(&line, UnitAddress::MIN, true).await), words).unwrap()
+        done(async move |line| speeds.ramp(&line, UNIT, true).await, words).unwrap()
     };
     let by_bus = [(0x0001, 2), (0x0002, 0), (0x0006, 8), (0x0003, 5000), (0x000C, 100)];
     assert_eq!(ramp(&by_bus), Ramp { slope: Some(5.0), only_by_bus: true });
@@ -73,19 +43,16 @@ fn the_ramp_of_a_gd350() {
 fn a_drive_that_does_not_say_its_ramp_has_none_that_is_known() {
     let ends = |cause| {
         let speeds = of("gd350");
-        let mut task = Task::new(async move |line| speeds.ramp(&line, UnitAddress::MIN, true).await);
-        let seen = Seen { now: Instant::ZERO, connection: 0, is_closed: false };
-        assert!(matches!(task.step(seen, None), Ok(Step::Wish(_))));
-        match task.step(seen, Some(Outcome::Failed(Failed(cause)))).unwrap() {
-            Step::Done(ramp) => ramp,
-            Step::Wish(wish) => panic!("{wish}"),
-        }
+        let mut script = Script::new();
+        let ramp = script.carry_out(|_| fails(cause), async move |line| speeds.ramp(&line, UNIT, true).await);
+        assert_eq!(script.asked.len(), 1);
+        ramp
     };
     for cause in [Cause::NoAnswer, Cause::BadAnswer, Cause::Refused(ExceptionCode(2), Meaning::NoSuch)] {
         assert_eq!(ends(cause), Ok(Ramp::default()), "{cause:?}");
     }
     for cause in [Cause::Port, Cause::Other] {
-        assert_eq!(ends(cause), Err(Failed(cause)));
+        assert_eq!(ends(cause).unwrap_err().cause, cause);
     }
 }
 
@@ -94,8 +61,7 @@ fn a_drive_that_does_not_say_its_ramp_has_none_that_is_known() {
 fn where_the_state_says_rest_on_the_ramp_the_frequency_decides() {
     let turns = |name: &str, state, words: &[(u16, u16)]| {
         let speeds = of(name);
-        let task = Task::new(async move |line| speeds.turns_in_spite_of(state, &line, UnitAddress::MIN, true).await);
-        done(task, words).unwrap()
+        done(async move |line| speeds.turns_in_spite_of(state, &line, UNIT, true).await, words).unwrap()
     };
     let place = Profile::builtin("atv312").unwrap().role("frequency").and_then(Entry::address).unwrap();
     assert!(turns("atv312", State::Stopped, &[(place, 100)]));
@@ -108,9 +74,8 @@ fn where_the_state_says_rest_on_the_ramp_the_frequency_decides() {
 fn every_family_can_be_asked() {
     for name in Profile::builtin_names() {
         let (first, second) = (of(name), of(name));
-        let frequencies =
-            done(Task::new(async move |line| first.frequencies(&line, UnitAddress::MIN, false).await), &[]);
-        let ramp = done(Task::new(async move |line| second.ramp(&line, UnitAddress::MIN, false).await), &[]);
+        let frequencies = done(async move |line| first.frequencies(&line, UNIT, false).await, &[]);
+        let ramp = done(async move |line| second.ramp(&line, UNIT, false).await, &[]);
         assert!(frequencies.unwrap().is_none_or(|it| it.output.abs() < f64::EPSILON), "{name}");
         assert_eq!(ramp.unwrap().slope, None, "{name}");
     }
