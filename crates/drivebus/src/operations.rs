@@ -3,12 +3,12 @@
 //! An operation is written once, in `drivebus-drive`; here it finds a line, for who waits and for who awaits.
 
 use std::sync::Arc;
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
 use drivebus_drive::task::{Cause, LineError, Misuse, Outcome, Read, Seen, Stamped, Step, Task, Wish};
 use drivebus_drive::{self as drive, Families, Identification, Look, Looks, NotTold};
 use drivebus_line::{Done, ErrorKind};
-use drivebus_rtu::{ExceptionCode, Instant};
+use drivebus_rtu::{Answer, ExceptionCode, Instant};
 
 use crate::bus::Bus;
 use crate::checks;
@@ -63,6 +63,11 @@ pub(crate) fn identify(unit: u8) -> Result<Task<Result<Identification, Error>, E
 pub(crate) fn look(unit: u8, looks: &Arc<Looks>) -> Result<Task<Result<Look, Error>, Error>, Error> {
     let (unit, looks) = (checks::unit(unit)?, Arc::clone(looks));
     Ok(Task::new(move |line| async move { looks.look(&line, unit, false).await }))
+}
+
+/// An operation wants what no bus does.
+pub(crate) fn unknown(wish: &Wish) -> Error {
+    Error::not_allowed(format!("no bus knows how to do {wish}"))
 }
 
 /// What a read of an operation wants otherwise than its bus.
@@ -138,7 +143,7 @@ impl Bus {
                     Outcome::Slept
                 }
                 Step::Wish(Wish::Read(read)) => self.came_of(&read).unwrap_or_else(Outcome::Failed),
-                Step::Wish(wish) => return Err(Error::not_allowed(format!("no bus knows how to do {wish}"))),
+                Step::Wish(wish) => return Err(unknown(&wish)),
             });
         }
     }
@@ -155,8 +160,8 @@ impl Bus {
             return Outcome::Words(words);
         }
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        let ago = |moment| self.now().saturating_duration_since(moment);
-        let at = |moment: Instant| -> Duration { now.saturating_sub(ago(moment)) };
+        let here = self.now();
+        let at = |moment| now.saturating_sub(here.saturating_duration_since(moment));
         Outcome::Stamped(Stamped { words, asked: at(done.sent), answered: at(done.ended) })
     }
 
@@ -164,7 +169,7 @@ impl Bus {
         let request = checks::read(read.place, read.count)?;
         let options = options_of(read).of(&request)?;
         let mut words = Vec::new();
-        let mut take = |answer: drivebus_rtu::Answer<'_>| words = replies::words(&answer);
+        let mut take = |answer: Answer<'_>| words = replies::words(&answer);
         let done = self.call(read.unit.into(), &request, options, &mut take)?;
         Ok(self.outcome_of(read, words, &done))
     }

@@ -4,8 +4,9 @@ use std::fmt::Debug;
 use std::sync::{Mutex, TryLockError};
 use std::time::Duration;
 
-use drivebus_drive::task::{Cause, LineError, Mailbox, Outcome, Read, Seen, Stamped, Step, Wish};
-use drivebus_drive::task::{Misuse, Task as Driven};
+use drivebus_drive::task::{
+    Cause, LineError, Mailbox, Misuse, Outcome, Read, Seen, Stamped, Step, Task as Driven, Wish,
+};
 use drivebus_rtu::{ExceptionCode, Instant, Meaning};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;

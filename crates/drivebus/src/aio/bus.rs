@@ -158,7 +158,7 @@ impl Bus {
                     self.sleep(time).await.map_or_else(Outcome::Failed, |()| Outcome::Slept)
                 }
                 Step::Wish(Wish::Read(read)) => self.came_of(read).await.unwrap_or_else(Outcome::Failed),
-                Step::Wish(wish) => return Err(Error::not_allowed(format!("no bus knows how to do {wish}"))),
+                Step::Wish(wish) => return Err(operations::unknown(&wish)),
             });
         }
     }
