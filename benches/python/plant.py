@@ -294,6 +294,8 @@ def measure(given: argparse.Namespace) -> dict[str, float]:
                 mine = [f"d{line}-{unit}" for line in range(len(ports[which::number])) for unit in range(1, drives + 1)]
                 fill(place, mine, given.backlog)
             gateways.append(Gateway(place))
+            # One that has ended already is not told again.
+            stack.callback(gateways[-1].end, signal.SIGKILL)
         figures = befall(gateways, postgres, mosquitto, metrics, given)
         figures |= until_all_is_in(gateways, postgres, 1_800.0)
         figures["lost"] = sum(status(each.folder)["spool"]["lost"] for each in gateways)
