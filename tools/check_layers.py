@@ -101,6 +101,7 @@ ROOMS: list[set[str]] = [
 # Rooms that may import the compiled core.
 ON_THE_CORE = {
     "rtu",
+    "look",
     "profile",
     "capture",
     "sim",

@@ -21,6 +21,7 @@ __version__: Final[str]
 __all__ = [
     "ANSWER_WITHIN",
     "HALTS",
+    "STANDSTILL",
     "Aim",
     "Asked",
     "Batch",
@@ -83,6 +84,9 @@ __all__ = [
 
 ANSWER_WITHIN: Final[float]
 """Seconds that a unit is given to answer what is asked before a halt, and the halt itself."""
+
+STANDSTILL: Final[float]
+"""Output frequency in Hz up to which a drive that has stopped counts as stopped."""
 
 HALTS: Final[tuple[str, str, str]]
 """The commands that end a motion, in the order of who else may stand in for one that a family lacks."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from drivebus import _native
 from drivebus.values import ControlSource, Fault, State
 
 __all__ = ["STANDSTILL", "Look"]
 
-STANDSTILL = 0.05
+STANDSTILL = _native.STANDSTILL
 """Output frequency in Hz up to which a drive that has stopped counts as stopped."""
 
 

@@ -102,6 +102,7 @@ mod _native {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("HALTS", PyTuple::new(module.py(), crate::family::halts())?)?;
         module.add("ANSWER_WITHIN", drivebus_drive::ANSWER_WITHIN.as_secs_f64())?;
+        module.add("STANDSTILL", drivebus_drive::STANDSTILL)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }
