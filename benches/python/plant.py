@@ -23,8 +23,10 @@ import sys
 import tempfile
 import time
 import urllib.request
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
+from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -94,6 +96,8 @@ class Historian:
     def __init__(self, port: int) -> None:
         self.numbers: set[tuple[str, int]] = set()
         self.times = 0
+        self.oldest = 0.0
+        """How old a state was at most when it came, in seconds."""
         self._client = paho.Client(CallbackAPIVersion.VERSION2, client_id="historian", protocol=paho.MQTTv5)
         self._client.on_message = self._hears
         self._client.on_connect = self._begins
@@ -107,6 +111,10 @@ class Historian:
         self._client.subscribe("drivebus/#", qos=1)
 
     def _hears(self, _: Any, __: Any, message: paho.MQTTMessage) -> None:
+        if message.topic.endswith("/state") and not message.retain:
+            told = json.loads(message.payload)
+            if "time" in told:
+                self.oldest = max(self.oldest, time.time() - datetime.fromisoformat(told["time"]).timestamp())
         if not message.topic.endswith(("/history", "/event")):
             return
         told = json.loads(message.payload)
@@ -201,24 +209,32 @@ def status(folder: Path) -> dict[str, Any]:
     return {}
 
 
-def until_all_is_in(gateways: Sequence[Gateway], postgres: Server, most: float) -> dict[str, float]:
-    """Waits until no sink is behind by more than what comes in a few seconds.
+def all_is_in(gateways: Sequence[Gateway]) -> bool:
+    """Whether no sink is behind by more than what comes in a few seconds."""
+    outlets = [each for of in gateways for each in status(of.folder).get("outlets", {}).values()]
+    sinks = [each for each in outlets if "behind" in each]
+    return len(sinks) >= 2 * len(gateways) and all(each["connected"] and each["behind"] < 2_000 for each in sinks)
 
-    How long that took, and how old meanwhile the newest sample in PostgreSQL was at most, in seconds.
+
+def present(
+    postgres: Server, historian: Historian, most: float, is_over: Callable[[], bool] = lambda: False
+) -> tuple[float, float, float]:
+    """How long it took until *is_over*, or *most* seconds; and how old meanwhile the present was at most.
+
+    That is the newest sample in PostgreSQL, whose spool commits once a second, and a state over MQTT when it came; all
+    in seconds.
     """
     begun, oldest, has_begun = time.monotonic(), 0.0, False
-    while time.monotonic() < begun + most:
-        outlets = [each for of in gateways for each in status(of.folder).get("outlets", {}).values()]
-        sinks = [each for each in outlets if "behind" in each]
-        if len(sinks) >= 2 * len(gateways) and all(each["connected"] and each["behind"] < 2_000 for each in sinks):
-            break
+    historian.oldest = 0.0
+    while time.monotonic() < begun + most and not is_over():
         # It has made no table yet, or has not told a sample of now.
         with suppress(UndefinedTable):
             [(age,)] = postgres.ask(NEWEST)
-            has_begun = has_begun or age < 60
+            if not has_begun and age < 60:
+                has_begun, historian.oldest = True, 0.0
             oldest = max(oldest, float(age)) if has_begun else 0.0
-        time.sleep(0.5)
-    return {"caught_up_s": time.monotonic() - begun, "newest_at_most_s": oldest}
+        time.sleep(0.1)
+    return time.monotonic() - begun, oldest, historian.oldest
 
 
 def fill(folder: Path, drives: Sequence[str], samples: int) -> None:
@@ -297,7 +313,10 @@ def measure(given: argparse.Namespace) -> dict[str, float]:
             # One that has ended already is not told again.
             stack.callback(gateways[-1].end, signal.SIGKILL)
         figures = befall(gateways, postgres, mosquitto, metrics, given)
-        figures |= until_all_is_in(gateways, postgres, 1_800.0)
+        took, rows, states = present(postgres, historian, 1_800.0, partial(all_is_in, gateways))
+        figures |= {"caught_up_s": took, "newest_at_most_s": rows, "state_at_most_s": states}
+        _, rows, states = present(postgres, historian, 60.0)
+        figures |= {"then_newest_at_most_s": rows, "then_state_at_most_s": states}
         figures["lost"] = sum(status(each.folder)["spool"]["lost"] for each in gateways)
         figures["memory_mb"] = max(max(each.memory) for each in gateways) / 1e6
         for each in gateways:
