@@ -96,8 +96,8 @@ class Historian:
     def __init__(self, port: int) -> None:
         self.numbers: set[tuple[str, int]] = set()
         self.times = 0
-        self.oldest = 0.0
-        """How old a state was at most when it came, in seconds."""
+        self.latest = 0.0
+        """How long a state was on its way at most, in seconds."""
         self._client = paho.Client(CallbackAPIVersion.VERSION2, client_id="historian", protocol=paho.MQTTv5)
         self._client.on_message = self._hears
         self._client.on_connect = self._begins
@@ -114,7 +114,8 @@ class Historian:
         if message.topic.endswith("/state") and not message.retain:
             told = json.loads(message.payload)
             if "time" in told:
-                self.oldest = max(self.oldest, time.time() - datetime.fromisoformat(told["time"]).timestamp())
+                said = datetime.fromisoformat(told["time"]).timestamp() + told["age"]
+                self.latest = max(self.latest, time.time() - said)
         if not message.topic.endswith(("/history", "/event")):
             return
         told = json.loads(message.payload)
@@ -217,24 +218,29 @@ def all_is_in(gateways: Sequence[Gateway]) -> bool:
 
 
 def present(
-    postgres: Server, historian: Historian, most: float, is_over: Callable[[], bool] = lambda: False
-) -> tuple[float, float, float]:
-    """How long it took until *is_over*, or *most* seconds; and how old meanwhile the present was at most.
+    postgres: Server, historian: Historian, name: str, most: float, is_over: Callable[[], bool] = lambda: False
+) -> dict[str, float]:
+    """How long it took until *is_over*, or *most* seconds; and how old meanwhile the present was, all in seconds.
 
-    That is the newest sample in PostgreSQL, whose spool commits once a second, and a state over MQTT when it came; all
-    in seconds.
+    That is the newest sample in PostgreSQL, whose spool commits once a second, and how long a state over MQTT took.
     """
-    begun, oldest, has_begun = time.monotonic(), 0.0, False
-    historian.oldest = 0.0
+    begun, ages = time.monotonic(), list[float]()
     while time.monotonic() < begun + most and not is_over():
         # It has made no table yet, or has not told a sample of now.
         with suppress(UndefinedTable):
             [(age,)] = postgres.ask(NEWEST)
-            if not has_begun and age < 60:
-                has_begun, historian.oldest = True, 0.0
-            oldest = max(oldest, float(age)) if has_begun else 0.0
+            if ages or age < 60:
+                historian.latest = historian.latest if ages else 0.0
+                ages.append(float(age))
         time.sleep(0.1)
-    return time.monotonic() - begun, oldest, historian.oldest
+    ages.sort()
+    return {
+        f"{name}_s": time.monotonic() - begun,
+        f"{name}_newest_median_s": ages[len(ages) // 2],
+        f"{name}_newest_99_s": ages[len(ages) * 99 // 100],
+        f"{name}_newest_at_most_s": ages[-1],
+        f"{name}_state_late_at_most_s": historian.latest,
+    }
 
 
 def fill(folder: Path, drives: Sequence[str], samples: int) -> None:
@@ -313,10 +319,9 @@ def measure(given: argparse.Namespace) -> dict[str, float]:
             # One that has ended already is not told again.
             stack.callback(gateways[-1].end, signal.SIGKILL)
         figures = befall(gateways, postgres, mosquitto, metrics, given)
-        took, rows, states = present(postgres, historian, 1_800.0, partial(all_is_in, gateways))
-        figures |= {"caught_up_s": took, "newest_at_most_s": rows, "state_at_most_s": states}
-        _, rows, states = present(postgres, historian, 60.0)
-        figures |= {"then_newest_at_most_s": rows, "then_state_at_most_s": states}
+        figures |= present(postgres, historian, "caught_up", 1_800.0, partial(all_is_in, gateways))
+        historian.latest = 0.0
+        figures |= present(postgres, historian, "then", 60.0)
         figures["lost"] = sum(status(each.folder)["spool"]["lost"] for each in gateways)
         figures["memory_mb"] = max(max(each.memory) for each in gateways) / 1e6
         for each in gateways:

@@ -27,7 +27,7 @@ _REST = 0.05
 """Seconds until a spool is waited at again that let nobody wait: it is closed."""
 _GRACE = 0.4
 """Seconds for a delivery that is under way when all shall end, and again after it was broken off."""
-_QUICK, _SLOW = 0.1, 0.3
+_QUICK, _SLOW = 0.05, 0.15
 """Seconds that a delivery takes: so many samples go at a time that it is between these."""
 _BEGINS_WITH, _MOST = 500, 10_000
 """Samples at a time."""
