@@ -41,6 +41,15 @@ class Read:
         table, address = tables.split(place)
         return cls(unit, address, count, table, urgent, verify)
 
+    def __str__(self) -> str:
+        """`read 2 from 2100H of unit 1, urgent, within 0.1 s, repeated 0 times at most`."""
+        place = tables.shown(tables.place(self.table, self.address))
+        what = f"read {place}" if self.count == 1 else f"read {self.count} from {place} on"
+        how = ", urgent" * self.urgent + ", until the same came twice" * self.verify
+        how += "" if self.timeout is None else f", within {self.timeout:g} s"
+        how += "" if self.retries is None else f", repeated {self.retries} times at most"
+        return f"{what} of unit {self.unit}{how}"
+
 
 @dataclass(frozen=True, slots=True)
 class Write:

@@ -1,7 +1,11 @@
-"""Operations of the core, carried out over a bus: what a task wishes for is asked, and it is told what came of that."""
+"""Operations of the core, carried out over a bus: what a task wishes for is asked, and it is told what came of that.
+
+Each wish and what came of it is a record of level DEBUG of the logger `drivebus.operations`.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Awaitable, Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeAlias
@@ -11,7 +15,9 @@ from drivebus.errors import DrivebusError
 from drivebus.line.asking import Ask, Read, Stamped
 from drivebus.line.protocols import AwaitableBus
 
-__all__ = ["carried_out", "carried_out_by"]
+__all__ = ["LOGGER", "carried_out", "carried_out_by"]
+
+LOGGER = "drivebus.operations"
 
 _Outcome: TypeAlias = "list[int] | Stamped | DrivebusError | None"
 _Around: TypeAlias = Callable[[], AbstractContextManager[None]]
@@ -64,5 +70,18 @@ async def _outcome_of(do: Callable[[Any], Awaitable[Any]], what: object, around:
         with around():
             outcome: list[int] | Stamped | None = await do(what)
     except DrivebusError as error:
+        _tell(what, f"{type(error).__name__}: {error}")
         return error
+    _tell(what, outcome)
     return outcome
+
+
+def _tell(wish: object, outcome: object) -> None:
+    """Tells what came of a *wish*. Who never imported `logging` does not want its records."""
+    logging = sys.modules.get("logging")
+    if logging is None:
+        return
+    logger = logging.getLogger(LOGGER)
+    if logger.isEnabledFor(logging.DEBUG):
+        wanted = f"wait {wish:g} s" if isinstance(wish, float) else wish
+        logger.debug("%s -> %s", wanted, "done" if outcome is None else outcome)
