@@ -19,22 +19,21 @@ _Writable: TypeAlias = tuple[str, int, list[int] | None, str, int | None, str, i
 
 __version__: Final[str]
 __all__ = [
-    "ANSWER_WITHIN",
-    "HALTS",
+    "FALL_PATIENCE",
     "STANDSTILL",
-    "Aim",
     "Asked",
     "Batch",
     "Bus",
-    "Fall",
     "Family",
     "Gateway",
+    "Halt",
     "Identity",
     "Looks",
     "Mailbox",
     "Plan",
     "Poller",
     "Profile",
+    "Record",
     "Requests",
     "Rule",
     "SameUnit",
@@ -82,14 +81,12 @@ __all__ = [
     "usable",
 ]
 
-ANSWER_WITHIN: Final[float]
-"""Seconds that a unit is given to answer what is asked before a halt, and the halt itself."""
+FALL_PATIENCE: Final[float]
+"""Seconds of the line's clock in which the frequency of a motor that stops must fall: even a ramp of an hour takes off
+a hundredth of a hertz in that time."""
 
 STANDSTILL: Final[float]
 """Output frequency in Hz up to which a drive that has stopped counts as stopped."""
-
-HALTS: Final[tuple[str, str, str]]
-"""The commands that end a motion, in the order of who else may stand in for one that a family lacks."""
 
 def crc16(data: Buffer, /) -> int:
     """CRC-16/MODBUS of *data*: 0..=0xFFFF. On the wire its low byte goes first."""
@@ -571,18 +568,8 @@ class Identity:
     A connection is the `reconnects` of the line, and *now* its clock in seconds.
     """
 
-    def __new__(cls, connection: int, /) -> Identity: ...
-    @property
-    def connection(self) -> int:
-        """The one over which it was heard."""
-    def is_known(self, connection: int, /) -> bool:
-        """Whether it said all that it is asked, over this connection, and nothing against its name."""
-    def is_old(self, now: float, /) -> bool:
-        """Whether what it said was said so long ago that another drive may have taken its place unseen."""
     def settle(self, connection: int, now: float, /) -> None:
         """Takes it for surely what it was named as, for as long as the port stays open."""
-    def is_another(self) -> None:
-        """It showed that it is not what it was named as: that is asked again."""
 
 @final
 class SameUnit:
@@ -598,25 +585,6 @@ class SameUnit:
         family, as `Family.contradiction` has it; `"unsaid"` and the error of the line; `"put_off"` and what was told;
         `"another"`, what was told before and what is told now.
         """
-    def contradiction(self, urgent: bool, /) -> Task:
-        """Asks the unit what it is. Its result is what speaks against the family, or None."""
-
-@final
-class Aim:
-    """The look at one unit that comes before a halt."""
-
-    def __new__(cls, unit: SameUnit, now: float, /) -> Aim: ...
-    @property
-    def heard(self) -> float:
-        """The line's clock when the unit last answered what it was asked, or may have."""
-    def doubt(self) -> bool:
-        """Puts in doubt what it was halted as. False if it was."""
-    def take(self, command: str, /) -> Task:
-        """As what to halt the unit.
-
-        Its result is `"target"`, the name of the family and the command of that; `"unsaid"` where it did not say yet;
-        or `"may_be"` and the families that it may be, which may be none. NotAllowed: there is no such command.
-        """
 
 def goes_out_at_once(unit: SameUnit, what: str | int, connection: int, /) -> bool:
     """Whether nothing is asked before *what*, as for `Family`, is sent."""
@@ -624,7 +592,8 @@ def goes_out_at_once(unit: SameUnit, what: str | int, connection: int, /) -> boo
 def check_harmless(unit: SameUnit, what: str | int, /) -> Task:
     """Makes sure that *what*, as for `Family`, does no harm to the unit.
 
-    Its result is `"harmless"`; `"may_be"` as of `Aim.take`; or `"busy"` as of `identify`.
+    Its result is `"harmless"`; `"may_be"` and the families that it may be, which may be none; or `"busy"` as of
+    `identify`.
     """
 
 def identify(unit: int, /) -> Task:
@@ -666,14 +635,10 @@ class Looks:
         That is the state, its word or None, the number of the fault or None, whether it is in that, the bit fields with
         what they mean, and the Unix time at which the first of it was asked for.
         """
-    def frequencies(self, unit: int, urgent: bool, /) -> Task:
-        """Comes to the output frequency and the setpoint in force or None, in Hz; to None where there are none."""
     def output_frequency(self, unit: int, urgent: bool, /) -> Task:
         """Comes to the output frequency in Hz; to None where the family does not tell."""
     def turns_in_spite_of(self, unit: int, state: str, urgent: bool, /) -> Task:
         """Comes to whether a motor whose *state* says that it rests turns. NotAllowed: there is no such state."""
-    def ramp(self, unit: int, urgent: bool, /) -> Task:
-        """Comes to the slope of the ramp in Hz/s or None, and to whether only the bus commands the drive."""
 
 @final
 class Task:
@@ -688,19 +653,101 @@ class Task:
             now: Seconds on the line's clock. A moment before the last one counts as that.
             connection: The `reconnects` of the line.
             closed: Whether the line was closed for good.
-            outcome: What came of the last wish: words of a read, an error of the line; None at the first step, and
-                where a sleep is over.
             outcome: What came of the last wish: words of a read, with their moments where that is stamped, or an error
-                of the line; None at the first step, and where a sleep is over.
+                of the line; None at the first step, where a sleep is over, a write was confirmed, or a notice was
+                heard.
 
         Returns:
-            `"read"` or `"stamped"` and the arguments of a `drivebus.line.asking.Read`; `"sleep"` and seconds of the
-            line's clock; or `"done"` and the result.
+            `"read"` or `"stamped"` and the arguments of a `drivebus.line.asking.Read`; `"write"` and those of a
+            `drivebus.line.asking.Write`; `"sleep"` and seconds of the line's clock; the notice `"took"` and a command
+            that the unit took, or `"saw"` and what `Looks.look` comes to; or `"done"` and the result.
 
         Raises:
             DrivebusError: It failed; an error of the line that it does not handle comes back as it was given.
             RuntimeError: *outcome* is none of the last wish, or the task is done. It is as it was before.
         """
+    @property
+    def family(self) -> str | None:
+        """As one of which family the unit of the last wish is taken, by the name of its profile; None: nobody says so.
+
+        Its refusals are told in the words of that family.
+        """
+
+@final
+class Record:
+    """What was sent to one unit, and what it said of itself; all handles of the unit have the same one."""
+
+    def __new__(cls) -> Record: ...
+    def identity(self, family: str, connection: int, /) -> Identity:
+        """What it said in the words of *family*, over *connection*, the `reconnects` of the line; nothing at first."""
+    def count_start(self) -> None:
+        """One more start is about to be sent."""
+    @property
+    def starts(self) -> int:
+        """How many starts were sent, or were about to be."""
+    @property
+    def halts_begun(self) -> int:
+        """How many halts, of whatever kind, were about to go out."""
+    @property
+    def halts(self) -> int:
+        """How many halts have gone out."""
+    @property
+    def started_as(self) -> str | None:
+        """The state that its last start was for; unknown after a jog or a raw write. None: it was not started."""
+    @started_as.setter
+    def started_as(self, state: str, /) -> None: ...
+    @property
+    def started_unverified(self) -> bool:
+        """Whether it was started by what is not verified, and so may be stopped by that."""
+    @started_unverified.setter
+    def started_unverified(self, is_unverified: bool, /) -> None: ...
+
+@final
+class Halt:
+    """One unit that is to be halted: sent until it takes it, and proved.
+
+    The result of its tasks is `"done"`, and whether nothing is left to be done; or `"not_halted"`, the family that it
+    is taken for, the command sent last, when that was found, and the kind of the reason with what is told: `"may_not"`;
+    `"undecided"`, the command that was wanted, and families; `"unsaid"`; `"not_sent"` and the error; `"refused"` or
+    `"unanswered"`, the error, how often it was sent (the commands, in how many seconds, and how many seconds ago the
+    unit was heard or None), and a look as of `Looks.look` or the error instead of one; `"unasked"` and the error;
+    `"another"`, what speaks against its name or None, and a kind with what is told of it, which may be `"failed"` and
+    an error; `"port_lost"` and the error; `"unshown"`, the last look, and the frequency in Hz or None; or `"unread"`
+    and the error of the last look.
+    """
+
+    def __new__(
+        cls,
+        unit: SameUnit,
+        looks: Looks,
+        record: Record,
+        command: str,
+        coasts: bool,
+        within: float,
+        confirm: float,
+        now: float,
+        /,
+    ) -> Halt:
+        """Nothing is sent yet.
+
+        Args:
+            unit: The unit, as it was named.
+            looks: Those of its profile, whose trust counts for the command too.
+            record: What is remembered of it.
+            command: What is sent. NotAllowed: there is no such command.
+            coasts: Whether each fourth frame is a coast.
+            within: Seconds for which it is sent until it is taken.
+            confirm: Seconds for which its state is looked at; 0 does not look.
+            now: Seconds on the line's clock.
+        """
+    def carry_out(self) -> Task:
+        """Does all of it. One task at a time; RuntimeError otherwise."""
+    def advance(self) -> Task:
+        """Does the next thing of it: sends, asks what the unit is, or looks."""
+    def pause(self, now: float, /) -> float:
+        """Seconds until there is something to do again."""
+    def wait(self, seconds: float, /) -> None:
+        """For *seconds* others were seen to: its proof does not count them."""
 
 def code_places() -> list[int]:
     """Where units of the shipped families keep their codes."""
@@ -724,44 +771,6 @@ def forbidden(families: Sequence[Family], place: int, words: int | Sequence[int]
 
 def commanded_at(place: int, /) -> list[str]:
     """The titles of the shipped families that take commands at *place*. NotAllowed: there is no such place."""
-
-@final
-class Fall:
-    """What was seen of a motor since a stop was sent, and whether that proves that it obeys.
-
-    Moments are seconds of the line's clock, to a nanosecond; what lies before or behind it is its begin or its end.
-    """
-
-    PATIENCE: Final[float]
-    """Seconds of the line's clock in which the frequency of a motor that stops must fall: even a ramp of an hour takes
-    off a hundredth of a hertz in that time."""
-
-    def __new__(cls, sent: float, confirmed: float, within: float, /) -> Fall:
-        """Nothing was seen yet: the stop goes out at *sent* or later, and the drive had confirmed it at *confirmed*.
-
-        For *within* seconds behind that it is looked at in any case.
-        """
-    @property
-    def until(self) -> float:
-        """Until when it is worth another look."""
-    @property
-    def frequency(self) -> float | None:
-        """The one seen last, in Hz; None if none was."""
-    @property
-    def seen_at(self) -> float:
-        """When that was; *confirmed* if none was."""
-    def wait(self, seconds: float, /) -> None:
-        """For *seconds* nobody looked, because something else was asked: they do not count."""
-    def goes_on(self) -> None:
-        """It is not at rest."""
-    def rests(self, now: float, /) -> bool:
-        """It is at rest. Whether that is its standstill, and no passage through zero."""
-    def see(self, hz: float, setpoint: float, asked: float, answered: float, /) -> None:
-        """Takes the frequency and the setpoint in force of one look into account, both in Hz; inf is an unknown one."""
-    def is_worth_asking(self) -> bool:
-        """Whether so much of it was seen that it is worth asking the drive for its ramp."""
-    def goes_along(self, slope: float, /) -> bool:
-        """Whether enough was seen, and all of it where a ramp of *slope* Hz/s goes that began with the stop."""
 
 @final
 class Profile:

@@ -10,7 +10,7 @@ from collections import defaultdict
 from pathlib import Path
 
 from drivebus import Profile, profiles, tables
-from drivebus.identify.harm import harmed
+from drivebus.profile.family import family_of
 
 PAGE = Path(__file__).resolve().parents[2] / "docs/developers/halts.md"
 BEGIN, END = "<!-- table: kept by tests/python/test_halts_page.py -->\n", "<!-- end of the table -->"
@@ -26,7 +26,7 @@ def table() -> str:
             if command in profile.commands():
                 means, harms = rows[profile.command(command)]
                 means[called].append(name)
-                harms.update(each.name for each in harmed(profile, command))
+                harms.update(family_of(profile).harmed(command))
     lines = ["| word | is | starts, reverses or sets something in |", "| --- | --- | --- |"]
     for (place, word), (means, harms) in sorted(rows.items()):
         kind, address = tables.split(place)

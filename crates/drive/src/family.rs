@@ -143,6 +143,11 @@ impl Family {
         answer.passes() || answer.exception().is_some_and(means_later)
     }
 
+    /// What its units say by the exception `code`.
+    pub(crate) fn meaning_of(&self, code: ExceptionCode) -> Meaning {
+        self.meanings.of(code)
+    }
+
     /// Whether one of the families that its units report as is among the shipped ones.
     pub(crate) fn is_shipped(&self) -> bool {
         self.is_shipped

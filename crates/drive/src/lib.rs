@@ -31,8 +31,9 @@
 //!
 //! A drive that was told to stop says "running" until its motor stands. [`Fall`] takes what is seen of that meanwhile, and
 //! knows whether it proves that the motor obeys.
-//! [`Families`] knows whom a word would harm, and [`Apart`] which few words to ask a unit for before it is sent. What takes
-//! several questions is an operation, driven by hand as a [`Task`](task::Task): [`identify()`], [`SameUnit`] and [`Aim`].
+//!
+//! What takes several questions is an operation, driven by hand as a [`Task`](task::Task): [`identify()`], [`SameUnit`],
+//! [`Aim`], and [`Halt`], which stops a motor and proves it.
 //!
 //! # Rooms
 //!
@@ -53,6 +54,8 @@
 //! | `same_unit` | whether a unit is what it was named as, and still the one it was |
 //! | `huanyang` | frames of another protocol on the same wires, and what may be an answer |
 //! | `aim` | as what a unit is halted, and whether a word may be sent to it |
+//! | `record` | what was sent to a unit, and what it said of itself |
+//! | `halt` | a halt: sent until the unit takes it, and proved |
 //! | `look` | what the status words of a drive say |
 //! | `speed` | how fast a motor turns, and how its drive slows it down |
 //! | `task` | operations that wait for a line, and how they are driven without one |
@@ -69,10 +72,12 @@ mod fall;
 mod families;
 mod family;
 mod guard;
+mod halt;
 mod harm;
 pub mod huanyang;
 mod identify;
 mod look;
+mod record;
 mod rule;
 mod same_unit;
 #[cfg(test)]
@@ -91,9 +96,11 @@ pub use fall::{Fall, Glimpse};
 pub use families::Families;
 pub use family::{Family, HALTS};
 pub use guard::Forbidden;
+pub use halt::{After, Halt, LastLook, NotHalted, Order, Taken, Tries, Why};
 pub use harm::What;
 pub use identify::{Certainty, Identification, Reason, identify};
 pub use look::{Look, Looks};
+pub use record::{Record, Sent};
 pub use rule::{Rule, WhyNot};
 pub use same_unit::{Identity, NotSame, SameUnit, Told};
 pub use speed::{Frequencies, Ramp, STANDSTILL, Speeds};

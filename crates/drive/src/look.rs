@@ -42,7 +42,7 @@ enum Role {
 }
 
 /// What one look showed.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Look {
     /// What the motor does; unknown where no word tells, or that word is none of the documented ones.
@@ -145,7 +145,7 @@ impl Looks {
     ///
     /// Those of [`Rule::state`].
     pub fn state(&self) -> Result<(), WhyNot<'_>> {
-        Rule::of(&self.profile, self.is_trusted).state()
+        self.rule().state()
     }
 
     /// Whether the present fault of its units may be read.
@@ -154,7 +154,12 @@ impl Looks {
     ///
     /// Those of [`Rule::fault`].
     pub fn fault(&self) -> Result<(), WhyNot<'_>> {
-        Rule::of(&self.profile, self.is_trusted).fault()
+        self.rule().fault()
+    }
+
+    /// What may be asked of its units, under the same trust.
+    pub(crate) fn rule(&self) -> Rule<'_> {
+        Rule::of(&self.profile, self.is_trusted)
     }
 
     /// Looks at `unit`, before all who wait for the line where it `is_urgent`. Where nothing may be read, nothing is asked.

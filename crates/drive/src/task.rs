@@ -18,7 +18,9 @@ use drivebus_rtu::Instant;
 use thiserror::Error;
 
 pub use line_error::{Cause, LineError};
-pub use wish::{Read, Stamped, Wish};
+pub use wish::{Notice, Payload, Read, Stamped, Wish, Write};
+
+use crate::family::Family;
 
 /// What is seen of the line before a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,8 +41,12 @@ pub enum Outcome<E> {
     Words(Vec<u16>),
     /// The same of a read that is to be stamped.
     Stamped(Stamped),
+    /// The unit confirmed what was written.
+    Written,
     /// The time is over.
     Slept,
+    /// Whoever drives has heard it.
+    Heard,
     /// It failed.
     Failed(E),
 }
@@ -79,13 +85,22 @@ pub enum Misuse {
 }
 
 /// Where an operation puts what it wants done, and finds what came of it.
-pub struct Mailbox<E>(Arc<Mutex<Desk<E>>>);
+pub struct Mailbox<E> {
+    desk: Arc<Mutex<Desk<E>>>,
+    family: Option<Arc<Family>>,
+}
 
 /// What lies between an operation and who drives it.
 struct Desk<E> {
     seen: Seen,
-    wish: Option<Wish>,
+    wish: Option<Wished>,
     outcome: Option<Outcome<E>>,
+}
+
+/// A wish, and as one of which family its unit is taken.
+struct Wished {
+    wish: Wish,
+    family: Option<Arc<Family>>,
 }
 
 impl<E> Mailbox<E> {
@@ -104,6 +119,12 @@ impl<E> Mailbox<E> {
         self.desk().seen.is_closed
     }
 
+    /// The same, for what is wished of a unit that is taken for one of `family`: see [`Task::family`].
+    #[must_use]
+    pub fn taken_for(&self, family: &Arc<Family>) -> Self {
+        Self { desk: Arc::clone(&self.desk), family: Some(Arc::clone(family)) }
+    }
+
     /// Reads words.
     ///
     /// # Errors
@@ -113,7 +134,7 @@ impl<E> Mailbox<E> {
         let words = |outcome| match outcome {
             Outcome::Words(words) => Some(Ok(words)),
             Outcome::Failed(error) => Some(Err(error)),
-            Outcome::Stamped(_) | Outcome::Slept => None,
+            _ => None,
         };
         self.ask(Wish::Read(Read { is_stamped: false, ..read }), words).await
     }
@@ -127,7 +148,7 @@ impl<E> Mailbox<E> {
         let stamped = |outcome| match outcome {
             Outcome::Stamped(stamped) => Some(Ok(stamped)),
             Outcome::Failed(error) => Some(Err(error)),
-            Outcome::Words(_) | Outcome::Slept => None,
+            _ => None,
         };
         self.ask(Wish::Read(Read { is_stamped: true, ..read }), stamped).await
     }
@@ -141,13 +162,32 @@ impl<E> Mailbox<E> {
         let slept = |outcome| match outcome {
             Outcome::Slept => Some(Ok(())),
             Outcome::Failed(error) => Some(Err(error)),
-            Outcome::Words(_) | Outcome::Stamped(_) => None,
+            _ => None,
         };
         self.ask(Wish::Sleep(time), slept).await
     }
 
+    /// Writes words, once.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`](Self::read) has them.
+    pub async fn write(&self, write: Write) -> Result<(), E> {
+        let written = |outcome| match outcome {
+            Outcome::Written => Some(Ok(())),
+            Outcome::Failed(error) => Some(Err(error)),
+            _ => None,
+        };
+        self.ask(Wish::Write(write), written).await
+    }
+
+    /// Tells whoever drives what has just come about.
+    pub async fn tell(&self, notice: Notice) {
+        self.ask(Wish::Tell(notice), |outcome| matches!(outcome, Outcome::Heard).then_some(())).await;
+    }
+
     async fn ask<T>(&self, wish: Wish, take: fn(Outcome<E>) -> Option<T>) -> T {
-        let mut wish = Some(wish);
+        let mut wish = Some(Wished { wish, family: self.family.clone() });
         poll_fn(|_| {
             let mut desk = self.desk();
             if let Some(wish) = wish.take() {
@@ -161,13 +201,13 @@ impl<E> Mailbox<E> {
     }
 
     fn desk(&self) -> MutexGuard<'_, Desk<E>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl<E> Clone for Mailbox<E> {
     fn clone(&self) -> Self {
-        Self(Arc::clone(&self.0))
+        Self { desk: Arc::clone(&self.desk), family: self.family.clone() }
     }
 }
 
@@ -216,7 +256,7 @@ pub struct Task<T, E> {
     operation: Option<Pin<Box<dyn Future<Output = T> + Send>>>,
     mailbox: Mailbox<E>,
     /// What is waited for.
-    wish: Option<Wish>,
+    wished: Option<Wished>,
 }
 
 impl<T, E> Task<T, E> {
@@ -226,8 +266,9 @@ impl<T, E> Task<T, E> {
         F: Future<Output = T> + Send + 'static,
     {
         let seen = Seen { now: Instant::ZERO, connection: 0, is_closed: false };
-        let mailbox = Mailbox(Arc::new(Mutex::new(Desk { seen, wish: None, outcome: None })));
-        Self { operation: Some(Box::pin(operation(mailbox.clone()))), mailbox, wish: None }
+        let desk = Arc::new(Mutex::new(Desk { seen, wish: None, outcome: None }));
+        let mailbox = Mailbox { desk, family: None };
+        Self { operation: Some(Box::pin(operation(mailbox.clone()))), mailbox, wished: None }
     }
 
     /// Goes on until the operation wants something, or is done.
@@ -238,12 +279,14 @@ impl<T, E> Task<T, E> {
     ///
     /// [`Misuse`]: the step was not made, or, as [`Misuse::Stuck`], came to nothing.
     pub fn step(&mut self, seen: Seen, outcome: Option<Outcome<E>>) -> Result<Step<T>, Misuse> {
-        let operation = self.operation.as_mut().ok_or(Misuse::Over)?;
+        if self.operation.is_none() {
+            return Err(Misuse::Over);
+        }
         let mut desk = self.mailbox.desk();
         if seen.now < desk.seen.now {
             return Err(Misuse::WentBack(desk.seen.now.saturating_duration_since(seen.now)));
         }
-        match (&self.wish, &outcome) {
+        match (self.pending(), &outcome) {
             (None, Some(_)) => return Err(Misuse::NotWished),
             (Some(wish), None) => return Err(Misuse::NoOutcome(wish.clone())),
             (Some(wish), Some(outcome)) if !wish.is_met_by(outcome) => return Err(Misuse::Unfit(wish.clone())),
@@ -252,19 +295,26 @@ impl<T, E> Task<T, E> {
         desk.seen = seen;
         desk.outcome = outcome;
         drop(desk);
-        self.wish = None;
+        self.wished = None;
+        let operation = self.operation.as_mut().ok_or(Misuse::Over)?;
         if let Poll::Ready(done) = operation.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
             self.operation = None;
             return Ok(Step::Done(done));
         }
-        self.wish = self.mailbox.desk().wish.take();
-        self.wish.clone().map(Step::Wish).ok_or(Misuse::Stuck)
+        self.wished = self.mailbox.desk().wish.take();
+        self.pending().cloned().map(Step::Wish).ok_or(Misuse::Stuck)
     }
 
     /// What is wished for and has no outcome yet: what a task that is dropped now leaves open. `None` before its first
     /// step, and where it is done.
     pub fn pending(&self) -> Option<&Wish> {
-        self.wish.as_ref()
+        self.wished.as_ref().map(|wished| &wished.wish)
+    }
+
+    /// As one of which family the unit of that wish is taken, so that a refusal is told in the words of that; `None` where
+    /// nobody says yet what it is, and each answer counts alone.
+    pub fn family(&self) -> Option<&Arc<Family>> {
+        self.wished.as_ref().and_then(|wished| wished.family.as_ref())
     }
 }
 
@@ -272,7 +322,7 @@ impl<T, E> fmt::Debug for Task<T, E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Task")
             .field("is_done", &self.operation.is_none())
-            .field("pending", &self.wish)
+            .field("pending", &self.pending())
             .finish_non_exhaustive()
     }
 }

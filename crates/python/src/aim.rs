@@ -1,58 +1,12 @@
-//! `Aim` for Python, and whether a word may be sent to a unit: as what it is taken, before anything is sent.
+//! Whether a word may be sent to a unit, for Python: as what it is taken, before anything is sent.
 
-use std::sync::Arc;
-
-use drivebus_drive::{self as drive, Families, NotTaken, Target};
-use drivebus_drives::Command;
+use drivebus_drive::{self as drive, Families, NotTaken};
 use pyo3::prelude::*;
 
-use crate::clock::{moment, to_seconds};
-use crate::errors::refuse;
 use crate::family::{names, what_of};
 use crate::identify::not_told;
 use crate::same_unit::SameUnit;
 use crate::task::{Failed, Task, unknown};
-
-/// The look at one unit that comes before a halt.
-#[pyclass(name = "Aim", frozen, module = "drivebus._native")]
-#[derive(Debug)]
-pub(crate) struct Aim(Arc<drive::Aim>);
-
-#[pymethods]
-impl Aim {
-    #[new]
-    #[pyo3(signature = (unit, now, /))]
-    fn new(unit: &SameUnit, now: f64) -> Self {
-        let unit = drive::SameUnit::clone(&unit.core());
-        Self(Arc::new(drive::Aim::new(unit, Families::shipped(), moment(now))))
-    }
-
-    #[getter]
-    fn heard(&self) -> f64 {
-        to_seconds(self.0.heard())
-    }
-
-    fn doubt(&self) -> bool {
-        self.0.doubt(Families::shipped())
-    }
-
-    #[pyo3(signature = (command, /))]
-    fn take(&self, command: &str) -> PyResult<Task> {
-        let command: Command = command.parse().map_err(refuse)?;
-        let aim = Arc::clone(&self.0);
-        let told = |py: Python<'_>, done: Result<Option<Target>, NotTaken<Failed>>| {
-            let told = match done {
-                Ok(Some(Target { family, command, .. })) => {
-                    ("target", (family.name(), command.name())).into_pyobject(py)?
-                }
-                Ok(None) => ("unsaid", ()).into_pyobject(py)?,
-                Err(error) => return not_taken(py, error),
-            };
-            Ok(told.into_any().unbind())
-        };
-        Ok(Task::of(|line| async move { aim.take(&line, Families::shipped(), command).await }, told))
-    }
-}
 
 /// Whether nothing is asked before `what` is sent; see `python/drivebus/_native.pyi`.
 #[pyfunction]

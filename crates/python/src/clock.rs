@@ -34,7 +34,12 @@ pub(crate) fn to_seconds(moment: Instant) -> f64 {
 
 /// The moment at so many seconds of the line's clock. A line that was lost may have no clock any more: then its beginning.
 pub(crate) fn moment(seconds: f64) -> Instant {
-    Instant::ZERO + Duration::try_from_secs_f64(seconds).unwrap_or_default()
+    Instant::ZERO + duration(seconds)
+}
+
+/// So many seconds; what is no time is none.
+pub(crate) fn duration(seconds: f64) -> Duration {
+    Duration::try_from_secs_f64(seconds).unwrap_or_default()
 }
 
 /// A moment of the simulation in seconds.

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use drivebus_drive::{self as drive, Answer, Contradiction, Families, HALTS, Said, What};
-use drivebus_drives::{Command, Place};
+use drivebus_drive::{self as drive, Answer, Contradiction, Families, Said, What};
+use drivebus_drives::Place;
 use drivebus_rtu::ExceptionCode;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -60,11 +60,6 @@ impl Family {
     fn contradiction<'py>(&self, py: Python<'py>, answers: Vec<Heard>) -> PyResult<Option<Against<'py>>> {
         self.0.contradiction(&all(answers)).map(|found| against(py, found)).transpose()
     }
-}
-
-/// The commands that end a motion, in the order of who else may stand in for one that a family lacks.
-pub(crate) fn halts() -> [&'static str; 3] {
-    HALTS.map(Command::name)
 }
 
 /// Where units of the shipped families keep their codes.

@@ -13,12 +13,12 @@ mod clock;
 mod convert;
 mod ending;
 mod errors;
-mod fall;
 mod family;
 mod format;
 mod frames;
 mod gateway;
 mod guard;
+mod halt;
 mod identify;
 mod look;
 mod mailbox;
@@ -28,10 +28,12 @@ mod plan;
 mod poll;
 mod profile;
 mod pyserial;
+mod record;
 mod requests;
 mod rule;
 mod same_unit;
 mod sheet;
+mod shown_look;
 mod signals;
 mod sim;
 mod sim_line;
@@ -44,16 +46,13 @@ mod trace;
 #[pymodule(gil_used = false)]
 mod _native {
     use pyo3::prelude::*;
-    use pyo3::types::PyTuple;
 
     #[pymodule_export]
-    use crate::aim::{Aim, check_harmless, goes_out_at_once};
+    use crate::aim::{check_harmless, goes_out_at_once};
     #[pymodule_export]
     use crate::bus::Bus;
     #[pymodule_export]
     use crate::ending::{begin_of_child, end_of_program};
-    #[pymodule_export]
-    use crate::fall::Fall;
     #[pymodule_export]
     use crate::family::{Family, code_places, code_rows, listed_codes};
     #[pymodule_export]
@@ -68,6 +67,8 @@ mod _native {
     #[pymodule_export]
     use crate::guard::{commanded_at, forbidden};
     #[pymodule_export]
+    use crate::halt::Halt;
+    #[pymodule_export]
     use crate::identify::{identify, usable};
     #[pymodule_export]
     use crate::look::Looks;
@@ -81,6 +82,8 @@ mod _native {
     use crate::poll::{Batch, Poller};
     #[pymodule_export]
     use crate::profile::{Profile, exception_means};
+    #[pymodule_export]
+    use crate::record::Record;
     #[pymodule_export]
     use crate::requests::{Asked, Requests, open_bus};
     #[pymodule_export]
@@ -100,8 +103,7 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        module.add("HALTS", PyTuple::new(module.py(), crate::family::halts())?)?;
-        module.add("ANSWER_WITHIN", drivebus_drive::ANSWER_WITHIN.as_secs_f64())?;
+        module.add("FALL_PATIENCE", drivebus_drive::Fall::PATIENCE.as_secs_f64())?;
         module.add("STANDSTILL", drivebus_drive::STANDSTILL)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

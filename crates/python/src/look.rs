@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use crate::convert::any_unit;
 use crate::errors::bad_argument;
 use crate::profile::Profile;
+use crate::shown_look::shown;
 use crate::task::{Failed, Task};
 
 /// What is looked at of units of one family, under one trust; see `python/drivebus/_native.pyi`.
@@ -21,9 +22,6 @@ pub(crate) struct Looks {
     looks: Arc<drive::Looks>,
     speeds: Arc<drive::Speeds>,
 }
-
-/// A look: state, its word, the number of the fault, whether it is in it, the fields, and when that was.
-type Shown = (&'static str, Option<u16>, Option<u16>, bool, Vec<(String, String)>, f64);
 
 #[pymethods]
 impl Looks {
@@ -69,14 +67,6 @@ impl Looks {
     }
 
     #[pyo3(signature = (unit, urgent, /))]
-    fn frequencies(&self, unit: &Bound<'_, PyAny>, urgent: bool) -> PyResult<Task> {
-        self.asked(unit, async move |speeds, line, unit| {
-            let told = speeds.frequencies(&line, unit, urgent).await?;
-            Ok(told.map(|told| (told.output, told.setpoint)))
-        })
-    }
-
-    #[pyo3(signature = (unit, urgent, /))]
     fn output_frequency(&self, unit: &Bound<'_, PyAny>, urgent: bool) -> PyResult<Task> {
         self.asked(unit, async move |speeds, line, unit| speeds.output(&line, unit, urgent).await)
     }
@@ -86,17 +76,14 @@ impl Looks {
         let state = State::named(state).ok_or_else(|| bad_argument(format!("state {state:?} is none")))?;
         self.asked(unit, async move |speeds, line, unit| speeds.turns_in_spite_of(state, &line, unit, urgent).await)
     }
-
-    #[pyo3(signature = (unit, urgent, /))]
-    fn ramp(&self, unit: &Bound<'_, PyAny>, urgent: bool) -> PyResult<Task> {
-        self.asked(unit, async move |speeds, line, unit| {
-            let ramp = speeds.ramp(&line, unit, urgent).await?;
-            Ok((ramp.slope, ramp.only_by_bus))
-        })
-    }
 }
 
 impl Looks {
+    /// The unit as it was named, under the trust of these.
+    pub(crate) fn taken(&self, same: drive::SameUnit) -> drive::Taken {
+        drive::Taken::as_named(same, &self.looks, &self.speeds)
+    }
+
     fn asked<T, F>(
         &self,
         unit: &Bound<'_, PyAny>,
@@ -110,9 +97,4 @@ impl Looks {
         let speeds = Arc::clone(&self.speeds);
         Ok(Task::of(|line| operation(speeds, line, unit), |py, told: Result<T, Failed>| told?.into_py_any(py)))
     }
-}
-
-fn shown(look: Look) -> Shown {
-    let Look { state, word, fault, is_in_fault, fields, asked, .. } = look;
-    (state.name(), word, fault, is_in_fault, fields, asked.as_secs_f64())
 }

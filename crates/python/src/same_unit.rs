@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use drivebus_drive::{self as drive, Contradiction, Families, NotSame};
+use drivebus_drive::{self as drive, Families, NotSame};
 use pyo3::prelude::*;
 
 use crate::clock::moment;
@@ -13,38 +13,13 @@ use crate::task::{Failed, Task, unknown};
 /// What a unit said of itself, asked in the words of one family.
 #[pyclass(name = "Identity", frozen, module = "drivebus._native")]
 #[derive(Debug)]
-pub(crate) struct Identity(drive::Identity);
+pub(crate) struct Identity(pub(crate) drive::Identity);
 
 #[pymethods]
 impl Identity {
-    #[new]
-    #[pyo3(signature = (connection, /))]
-    fn new(connection: u64) -> Self {
-        Self(drive::Identity::new(connection))
-    }
-
-    #[getter]
-    fn connection(&self) -> u64 {
-        self.0.connection()
-    }
-
-    #[pyo3(signature = (connection, /))]
-    fn is_known(&self, connection: u64) -> bool {
-        self.0.is_known(connection)
-    }
-
-    #[pyo3(signature = (now, /))]
-    fn is_old(&self, now: f64) -> bool {
-        self.0.is_old(moment(now))
-    }
-
     #[pyo3(signature = (connection, now, /))]
     fn settle(&self, connection: u64, now: f64) {
         self.0.settle(connection, moment(now));
-    }
-
-    fn is_another(&self) {
-        self.0.is_another();
     }
 }
 
@@ -77,16 +52,6 @@ impl SameUnit {
     fn check(&self, judged: bool, urgent: bool) -> Task {
         let same = self.core();
         Task::of(|line| async move { same.check(&line, Families::shipped(), judged, urgent).await }, checked)
-    }
-
-    #[pyo3(signature = (urgent, /))]
-    fn contradiction(&self, urgent: bool) -> Task {
-        let same = self.core();
-        let told = |py: Python<'_>, found: Result<Option<Contradiction>, Failed>| {
-            let found = found?.map(|found| against(py, found)).transpose()?;
-            Ok(found.into_pyobject(py)?.unbind())
-        };
-        Task::of(|line| async move { same.contradiction(&line, Families::shipped(), urgent).await }, told)
     }
 }
 

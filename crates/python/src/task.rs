@@ -1,18 +1,20 @@
 //! Operations of the core for Python: a task that wishes for what `drivebus.line.tasks` asks of its bus.
 
 use std::fmt::Debug;
-use std::sync::{Mutex, TryLockError};
+use std::sync::{Mutex, MutexGuard, TryLockError};
 use std::time::Duration;
 
 use drivebus_drive::task::{
-    Cause, LineError, Mailbox, Misuse, Outcome, Read, Seen, Stamped, Step, Task as Driven, Wish,
+    Cause, LineError, Mailbox, Misuse, Notice, Outcome, Payload, Read, Seen, Stamped, Step, Task as Driven, Wish, Write,
 };
 use drivebus_rtu::{ExceptionCode, Instant, Meaning};
+use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 use crate::clock::moment;
 use crate::errors::Class;
+use crate::shown_look::shown;
 
 /// An error of a bus: the exception itself, and what operations look at of it.
 #[derive(Debug)]
@@ -110,14 +112,12 @@ impl Task {
         closed: bool,
         outcome: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(&'static str, Bound<'py, PyAny>)> {
-        let mut held = match self.0.try_lock() {
-            Ok(held) => held,
-            Err(TryLockError::Poisoned(held)) => held.into_inner(),
-            Err(TryLockError::WouldBlock) => return Err(PyRuntimeError::new_err("another thread makes a step")),
-        };
+        let mut held = self.held()?;
         let (task, latest) = &mut *held;
         let outcome = match (outcome, task.pending()) {
             (None, Some(Wish::Sleep(_))) => Some(Outcome::Slept),
+            (None, Some(Wish::Write(_))) => Some(Outcome::Written),
+            (None, Some(Wish::Tell(_))) => Some(Outcome::Heard),
             (None, _) => None,
             (Some(given), Some(Wish::Read(read))) => Some(outcome_of(given, read)?),
             (Some(given), _) => Some(Outcome::Failed(Failed::of(given)?)),
@@ -129,7 +129,25 @@ impl Task {
             Step::Done(done) => Ok(("done", done?.into_bound(py))),
             Step::Wish(Wish::Sleep(time)) => Ok(("sleep", time.as_secs_f64().into_pyobject(py)?.into_any())),
             Step::Wish(Wish::Read(read)) => Ok((if read.is_stamped { "stamped" } else { "read" }, told_of(py, read)?)),
+            Step::Wish(Wish::Write(write)) => Ok(("write", written_of(py, write)?)),
+            Step::Wish(Wish::Tell(Notice::Took(command))) => Ok(("took", command.name().into_bound_py_any(py)?)),
+            Step::Wish(Wish::Tell(Notice::Saw(look))) => Ok(("saw", shown(look).into_bound_py_any(py)?)),
             Step::Wish(wish) => Err(unknown(&wish)),
+        }
+    }
+
+    #[getter]
+    fn family(&self) -> PyResult<Option<String>> {
+        Ok(self.held()?.0.family().map(|family| family.name().to_owned()))
+    }
+}
+
+impl Task {
+    fn held(&self) -> PyResult<MutexGuard<'_, (Operation, Instant)>> {
+        match self.0.try_lock() {
+            Ok(held) => Ok(held),
+            Err(TryLockError::Poisoned(held)) => Ok(held.into_inner()),
+            Err(TryLockError::WouldBlock) => Err(PyRuntimeError::new_err("another thread makes a step")),
         }
     }
 }
@@ -163,4 +181,17 @@ fn told_of(py: Python<'_>, read: Read) -> PyResult<Bound<'_, PyAny>> {
     let timeout = timeout.map(|time| time.as_secs_f64());
     let told = (unit.get(), place.address, count, table, is_urgent, false, timeout, retries);
     Ok(told.into_pyobject(py)?.into_any())
+}
+
+/// A write, in the order of the attributes of `drivebus.line.asking.Write`.
+fn written_of(py: Python<'_>, write: Write) -> PyResult<Bound<'_, PyAny>> {
+    let Write { unit, place, payload, is_urgent, read_back, connection, halts, is_forced, timeout, .. } = write;
+    let value = match payload {
+        Payload::Word(word) => word.into_bound_py_any(py)?,
+        Payload::Words(words) => words.into_bound_py_any(py)?,
+    };
+    let timeout = timeout.map(|time| time.as_secs_f64());
+    let table = place.table.name();
+    (unit.get(), place.address, value, table, is_urgent, read_back, connection, halts, is_forced, timeout)
+        .into_bound_py_any(py)
 }

@@ -60,21 +60,6 @@ class SameUnit:
         """The same for the core, where its words are known better: by *profile*."""
         return _native.SameUnit(self._unit, family_of(profile), self._identity, self.trusted)
 
-    def is_known(self, bus: AwaitableBus) -> bool:
-        """Whether it said all that it is asked, over the connection that *bus* has, and nothing against its name.
-
-        One that refused all that said nothing: any unit may.
-        """
-        return self._identity.is_known(bus.reconnects)
-
-    def is_old(self, bus: AwaitableBus) -> bool:
-        """Whether what it said of itself was said so long ago that another drive may have taken its place unseen."""
-        return self._identity.is_old(bus.now())
-
-    def is_another(self) -> None:
-        """It showed that it is not what it was named as, over whatever connection: that is asked again."""
-        self._identity.is_another()
-
     async def check(self, bus: AwaitableBus, *, judged: bool = True, urgent: bool = False) -> int:
         """Asks the unit over *bus* what it is, if the port was opened again or nobody has asked yet.
 
@@ -99,11 +84,6 @@ class SameUnit:
             # `started` stays None: of what was to follow, nothing left.
             raise type(told)(f"{self._unsaid()} ({told}); nothing was written", unit=self._unit, raw=told.raw) from told
         raise WrongDrive(self._not_same(kind, told), unit=self._unit)
-
-    async def contradiction(self, bus: AwaitableBus, *, urgent: bool = False) -> str | None:
-        """What the unit says against its profile, and what to do; None if nothing. Asks it in any case."""
-        against = await carried_out(self.seen_as(self._profile).contradiction(urgent), bus)
-        return None if against is None else in_words(self._profile, self._unit, against)
 
     def _not_same(self, kind: str, told: Any) -> str:
         if kind == "contradicts":

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 from drivebus._native import Task
 from drivebus.errors import DrivebusError
-from drivebus.line.asking import Ask, Read, Stamped
+from drivebus.line.asking import Ask, Read, Stamped, Write
 from drivebus.line.protocols import AwaitableBus
 
 __all__ = ["LOGGER", "carried_out", "carried_out_by"]
@@ -21,9 +21,14 @@ LOGGER = "drivebus.operations"
 
 _Outcome: TypeAlias = "list[int] | Stamped | DrivebusError | None"
 _Around: TypeAlias = Callable[[], AbstractContextManager[None]]
+_Hears: TypeAlias = Callable[[str, Any], None]
 
 
-async def carried_out(task: Task, bus: AwaitableBus, around: _Around = nullcontext) -> Any:
+def _deaf(_: str, __: object) -> None:
+    """Hears no notice."""
+
+
+async def carried_out(task: Task, bus: AwaitableBus, around: _Around = nullcontext, hears: _Hears = _deaf) -> Any:
     """What *task* comes to over *bus*.
 
     What interrupts a wish, as Ctrl-C and a cancellation do, goes through: then the task ends where it stands.
@@ -32,6 +37,7 @@ async def carried_out(task: Task, bus: AwaitableBus, around: _Around = nullconte
         task: It has not begun.
         bus: Who is asked.
         around: A block of its own around each request.
+        hears: Who is told its notices: of which kind, and what of it.
 
     Raises:
         DrivebusError: Those of the task, and those of *bus* that it does not handle, as they are.
@@ -47,8 +53,14 @@ async def carried_out(task: Task, bus: AwaitableBus, around: _Around = nullconte
             return told
         if kind == "sleep":
             outcome = await _outcome_of(bus.sleep, told, nullcontext)
+        elif kind == "read":
+            outcome = await _outcome_of(bus.ask, Read(*told), around)
+        elif kind == "stamped":
+            outcome = await _outcome_of(bus.ask_stamped, Read(*told), around)
+        elif kind == "write":
+            outcome = await _outcome_of(bus.ask, Write(*told), around)
         else:
-            outcome = await _outcome_of(bus.ask if kind == "read" else bus.ask_stamped, Read(*told), around)
+            hears(kind, told)
 
 
 async def carried_out_by(task: Task, ask: Ask) -> Any:

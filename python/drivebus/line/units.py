@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from weakref import WeakKeyDictionary
 
-from drivebus._native import Identity
+from drivebus._native import Identity, Record
 from drivebus.line.addresses import Addresses
 from drivebus.line.write_guard import check_words, prepare_guard
 from drivebus.profile import Profile
@@ -29,36 +29,46 @@ class UnitRecord:
     Attributes:
         address: Its address, 1..247.
         profiles: What it was asked for as, by name; the latest stands last.
-        identities: What it said of itself, by the name of the profile in whose words it was asked.
+        sent: What was sent to it, and what it said of itself.
         trusted: The names of profiles under which it was asked for as `unverified`.
         last_state: The state that was seen last, in words, and when on the line's clock.
         shown: The state that was seen last, and the fault in words where it was in one.
         is_lost: Whether the line failed when it was asked last.
         in_ram: Parameters that were written to RAM and not to EEPROM since: what they read as is then not stored.
         stores: How often each parameter was written to EEPROM.
-        starts: How many starts were sent, or were about to be.
-        halts_begun: How many stops, of whatever kind, were about to go out.
-        halts: How many stops have gone out.
-        started_as: How it was started last; unknown after a jog or a raw write. None: it was not.
         started_under: The profile by which it was started last.
-        started_unverified: Whether it was started by what is not verified, and so may be stopped by that.
     """
 
     address: int
     profiles: dict[str, Profile] = field(default_factory=dict)
-    identities: dict[str, Identity] = field(default_factory=dict)
+    sent: Record = field(default_factory=Record)
     trusted: set[str] = field(default_factory=set)
     last_state: tuple[str, float] | None = None
     shown: tuple[State, str | None] | None = None
     is_lost: bool = False
     in_ram: set[str] = field(default_factory=set)
     stores: Counter[str] = field(default_factory=Counter)
-    starts: int = 0
-    halts_begun: int = 0
-    halts: int = 0
-    started_as: State | None = None
     started_under: Profile | None = None
-    started_unverified: bool = False
+
+    @property
+    def starts(self) -> int:
+        """How many starts were sent, or were about to be."""
+        return self.sent.starts
+
+    @property
+    def halts_begun(self) -> int:
+        """How many stops, of whatever kind, were about to go out."""
+        return self.sent.halts_begun
+
+    @property
+    def halts(self) -> int:
+        """How many stops have gone out."""
+        return self.sent.halts
+
+    @property
+    def started_unverified(self) -> bool:
+        """Whether it was started by what is not verified, and so may be stopped by that."""
+        return self.sent.started_unverified
 
     @property
     def profile(self) -> Profile | None:
@@ -72,10 +82,7 @@ class UnitRecord:
 
         Whoever asks for a drive anew takes whatever answers there now.
         """
-        known = self.identities.get(profile.name)
-        if known is None or known.connection != connection:
-            known = self.identities[profile.name] = Identity(connection)
-        return known
+        return self.sent.identity(profile.name, connection)
 
 
 class Units:

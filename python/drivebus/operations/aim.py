@@ -11,7 +11,6 @@ What is asked, and as what the unit is taken, is decided in the core (`crates/dr
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 from drivebus import _native
 from drivebus.advice import Text, argument
@@ -22,60 +21,7 @@ from drivebus.line.tasks import carried_out
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
 
-__all__ = ["ANSWER_WITHIN", "Aim", "Target", "check_harmless", "goes_out_at_once"]
-
-ANSWER_WITHIN = _native.ANSWER_WITHIN
-"""Seconds that a unit is given to answer what is asked before a halt, and the halt itself."""
-
-
-class Target(NamedTuple):
-    """What is sent to halt a unit.
-
-    Attributes:
-        unit: The unit, as the family that it is taken for.
-        command: The command of that family.
-    """
-
-    unit: DriveView
-    command: str
-
-
-class Aim:
-    """The look at one unit that comes before a halt. What was answered is kept between two tries.
-
-    Args:
-        unit: The unit, as it was named.
-    """
-
-    def __init__(self, unit: DriveView) -> None:
-        self._unit = unit
-        self._aim = _native.Aim(_seen(unit), unit.bus.now())
-
-    @property
-    def heard(self) -> float:
-        """The line's clock when the unit last answered what it was asked, or may have."""
-        return self._aim.heard
-
-    def doubt(self) -> bool:
-        """Puts in doubt what it was halted as: what it says now decides, and silence says nothing. False if it was."""
-        return self._aim.doubt()
-
-    async def take(self, command: str) -> Target | None:
-        """As what to halt the unit by *command*, or None where it did not say yet.
-
-        Raises:
-            NotAllowed: It may be one of several families that want different words, or fits none. Nothing was sent.
-            PortError: The port is lost.
-        """
-        unit = self._unit
-        kind, told = await carried_out(self._aim.take(command), unit.bus)
-        if kind == "unsaid":
-            return None
-        if kind == "may_be":
-            raise _undecided(unit, command, _profiles(unit, told))
-        [profile] = _profiles(unit, told[:1])
-        # That its own papers are thin is no reason to let it run: nothing else halts what shows this family.
-        return Target(unit if profile is unit.profile else unit.taken_for(profile), told[1])
+__all__ = ["check_harmless", "goes_out_at_once", "profiles_of", "undecided"]
 
 
 def goes_out_at_once(unit: DriveView, what: str | int) -> bool:
@@ -116,19 +62,20 @@ async def check_harmless(unit: DriveView, what: str | int) -> None:
             raw=error.raw,
         ) from error
     if kind == "may_be":
-        raise _another(unit, _profiles(unit, told))
+        raise _another(unit, profiles_of(unit, told))
 
 
 def _seen(unit: DriveView) -> _native.SameUnit:
     return unit.identity.seen_as(unit.profile)
 
 
-def _profiles(unit: DriveView, names: Iterable[str]) -> tuple[Profile, ...]:
+def profiles_of(unit: DriveView, names: Iterable[str]) -> tuple[Profile, ...]:
     """The families of *names*: of a name that it shares with a shipped one, the named one is the one that is meant."""
     return tuple(unit.profile if name == unit.profile.name else Profile.builtin(name) for name in names)
 
 
-def _undecided(unit: DriveView, command: str, others: tuple[Profile, ...]) -> NotAllowed:
+def undecided(unit: DriveView, command: str, others: tuple[Profile, ...]) -> NotAllowed:
+    """Why *command* does not go out: *unit* may be any of *others*, or where there are none fits no family."""
     named = f"unit {unit.address} was named {unit.profile.name} ({unit.profile.title})"
     if not others:
         return WrongDrive(

@@ -129,7 +129,7 @@ async def _set_bits(unit: DriveView, setpoint: str, given: Mapping[str, object],
     if not moves:
         await raw_words.write(unit, address, word, read_back=unit.profile.read_back(register))
         return
-    unit.record.started_unverified |= unit.unverified
+    unit.record.sent.started_unverified |= unit.unverified
     await commands.send_word(unit, A_WORD, address, word)
 
 

@@ -9,13 +9,13 @@ import math
 from contextlib import suppress
 
 from drivebus import checks
+from drivebus._native import FALL_PATIENCE
 from drivebus.errors import BadArgument, DrivebusError, Unconfirmed
 from drivebus.operations import parameters, registers, speed, state
 from drivebus.operations.commands import POLL_INTERVAL
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.in_parts import counted
 from drivebus.operations.last_will import LastWill
-from drivebus.operations.stop_proof import PATIENCE
 from drivebus.profile.evidence import not_verified
 from drivebus.values import Value
 
@@ -151,7 +151,7 @@ class BusTimeout:
             frequency = await speed.output_frequency(self._unit)
             now = bus.now()
             if frequency is not None and frequency < lowest:
-                lowest, deadline = frequency, now + PATIENCE
+                lowest, deadline = frequency, now + FALL_PATIENCE
             elif now >= deadline:
                 return False
             await bus.sleep(POLL_INTERVAL)

@@ -20,18 +20,15 @@ from drivebus.errors import (
     Refused,
     Unconfirmed,
 )
-from drivebus.identify.harm import HALTS
 from drivebus.look import Look
 from drivebus.operations import events, raw_words, setpoints, state
 from drivebus.operations.drive_view import DriveView
-from drivebus.operations.stop_proof import Fall
 from drivebus.values import ControlSource
 
 __all__ = [
-    "A_WORD",
     "MAY",
     "POLL_INTERVAL",
-    "Proof",
+    "afterwards",
     "confirm",
     "frames_of",
     "prepared",
@@ -42,9 +39,6 @@ __all__ = [
 
 POLL_INTERVAL = 0.02
 """Seconds of the line's clock between two looks at the state."""
-
-_LONGER_INTERVAL = 0.1
-"""The same, where it takes longer than it was given. Each look goes before all who wait, as the stop did."""
 
 _LONG_LOOK = 0.5
 """Seconds of the line's clock that a look takes only where it waits until nothing that is late can be mistaken."""
@@ -155,101 +149,63 @@ def frames_of(error: DrivebusError) -> dict[str, Any]:
     return {"request": error.request, "raw": error.raw, "started": error.started, "ended": error.ended}
 
 
-async def state_afterwards(unit: DriveView, *, urgent: bool = False) -> str:
+async def state_afterwards(unit: DriveView) -> str:
     """The state of *unit* after a command of which nothing is known, in words: as it is read now, or was seen last."""
     try:
-        return f"State seen afterwards: {await state.glance(unit, urgent=urgent)}"
+        return afterwards(unit, await state.glance(unit))
     except (*LINE_ERRORS, Refused) as error:
-        return f"Its state could not be read afterwards either ({type(error).__name__}); {state.seen_last(unit)}"
+        return afterwards(unit, error)
 
 
-async def confirm(
-    unit: DriveView, command: str, shows: Callable[[Look], Awaitable[bool]], within: float, fall: Fall | None = None
-) -> None:
-    """Looks until the drive *shows* the command, for *within* seconds, and as long as a *fall* is worth a look."""
-    proof = Proof(unit, command, shows, within, fall)
-    while not await proof.look():
+def afterwards(unit: DriveView, seen: Look | Exception) -> str:
+    """What *unit* is *seen* to do after a command of which nothing is known, in words; or why it is not."""
+    if isinstance(seen, Look):
+        return f"State seen afterwards: {seen}"
+    return f"Its state could not be read afterwards either ({type(seen).__name__}); {state.seen_last(unit)}"
+
+
+async def confirm(unit: DriveView, command: str, shows: Callable[[Look], Awaitable[bool]], within: float) -> None:
+    """Looks until the drive *shows* the command, for *within* seconds; 0 does not look.
+
+    Raises:
+        Unconfirmed: It does not, or is in fault, or the port was lost.
+    """
+    if within <= 0 or state.planned(unit.evidence).looks.is_blind:
+        return
+    deadline = unit.bus.now() + within
+    while not await _is_shown(unit, command, shows, deadline):
         await unit.bus.sleep(POLL_INTERVAL)
 
 
-class Proof:
-    """The looks at one drive until it shows a command that was sent.
-
-    Args:
-        unit: The drive.
-        command: What was sent.
-        shows: Whether what is seen proves it.
-        within: Seconds for which it is looked at; 0 does not look.
-        fall: What is seen of its frequency: as long as that is worth a look, it is looked at in any case.
-    """
-
-    def __init__(
-        self,
-        unit: DriveView,
-        command: str,
-        shows: Callable[[Look], Awaitable[bool]],
-        within: float,
-        fall: Fall | None = None,
-    ) -> None:
-        self._unit, self._command, self._shows, self._fall = unit, command, shows, fall
-        self._asked = within > 0 and not state.planned(unit.evidence).looks.is_blind
-        self._deadline = unit.bus.now() + within
-
-    def wait(self, seconds: float) -> None:
-        """For *seconds* others were looked at: they do not count."""
-        self._deadline += seconds
-        if self._fall is not None:
-            self._fall.wait(seconds)
-
-    @property
-    def pause(self) -> float:
-        """Seconds to the next look: what takes longer than it was given leaves others the line in between."""
-        return POLL_INTERVAL if self._unit.bus.now() <= self._deadline else _LONGER_INTERVAL
-
-    async def look(self) -> bool:
-        """Looks once. Whether nothing is left to be proved.
-
-        Raises:
-            Unconfirmed: It is not proved, and not worth another look.
-        """
-        if not self._asked:
+async def _is_shown(unit: DriveView, command: str, shows: Callable[[Look], Awaitable[bool]], deadline: float) -> bool:
+    """Whether one look shows the command. Raises `Unconfirmed` where it does not, and another one is not worth it."""
+    began = unit.bus.now()
+    try:
+        seen = await state.glance(unit)
+        if await shows(seen):
             return True
-        unit, command, fall = self._unit, self._command, self._fall
-        began = unit.bus.now()
-        try:
-            seen = await state.glance(unit, urgent=command in HALTS)
-            if await self._shows(seen):
-                return True
-            last = f"state seen last: {seen}"
-            if fall is not None and fall.frequency is not None:
-                last += f", at {fall.frequency:g} Hz"
-            source = seen.source
-            if source not in (ControlSource.COMMUNICATION, None):
-                last += f", with commands from the {source}"
-            # A motor that was told to stop is looked at: some drives run on in a fault.
-            is_over = seen.fault is not None and command not in (*HALTS, "reset_fault")
-            ended = unit.bus.now()
-            # What was seen before a long wait for an answer that cannot be mistaken is old: that look is not the last.
-            looked_at = ended if ended - began < _LONG_LOOK else began
-        except (NoAnswer, BadAnswer, Refused) as error:
-            # A refusal here is one of a read: it says nothing about the command.
-            last = f"its last answer: {error}; {state.seen_last(unit)}"
-            is_over, looked_at = False, unit.bus.now()
-        except PortError as error:
-            raise Unconfirmed(
-                f"{said(command)} was sent to unit {unit.address}; the port was lost before its state showed it "
-                f"({error}): {MAY[command]}; {state.seen_last(unit)}{_once(command)}",
-                unit=unit.address,
-            ) from error
-        if not is_over and looked_at < (self._deadline if fall is None else fall.until):
-            return False
+        last = f"state seen last: {seen}"
+        source = seen.source
+        if source not in (ControlSource.COMMUNICATION, None):
+            last += f", with commands from the {source}"
+        is_over = seen.fault is not None and command != "reset_fault"
+        ended = unit.bus.now()
+        # What was seen before a long wait for an answer that cannot be mistaken is old: that look is not the last.
+        looked_at = ended if ended - began < _LONG_LOOK else began
+    except (NoAnswer, BadAnswer, Refused) as error:
+        # A refusal here is one of a read: it says nothing about the command.
+        last = f"its last answer: {error}; {state.seen_last(unit)}"
+        is_over, looked_at = False, unit.bus.now()
+    except PortError as error:
         raise Unconfirmed(
-            f"{said(command)} was sent to unit {unit.address}, and its state does not show it: {MAY[command]}; {last}"
-            f"{_once(command)}",
+            f"{said(command)} was sent to unit {unit.address}; the port was lost before its state showed it "
+            f"({error}): {MAY[command]}; {state.seen_last(unit)}. It was not repeated",
             unit=unit.address,
-        )
-
-
-def _once(command: str) -> str:
-    """That *command* was sent once, where that is so: a halt is sent until it is taken."""
-    return "" if command in HALTS else ". It was not repeated"
+        ) from error
+    if not is_over and looked_at < deadline:
+        return False
+    raise Unconfirmed(
+        f"{said(command)} was sent to unit {unit.address}, and its state does not show it: {MAY[command]}; {last}. "
+        "It was not repeated",
+        unit=unit.address,
+    )

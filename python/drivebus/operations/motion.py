@@ -18,8 +18,7 @@ from drivebus.operations.drive_view import DriveView
 from drivebus.operations.halting import WITHIN, Halt
 from drivebus.operations.in_parts import in_parts
 from drivebus.operations.program_end import before_start
-from drivebus.operations.stop_proof import Fall
-from drivebus.values import ControlSource, State
+from drivebus.values import State
 
 __all__ = [
     "coast",
@@ -29,7 +28,6 @@ __all__ = [
     "has_jog_stop",
     "jog",
     "jog_stop",
-    "prove",
     "reset_fault",
     "run",
     "stop",
@@ -236,12 +234,12 @@ async def _start(
     turning_round = before.state.running and before.state is not wanted
     frequency = await speed.output_frequency(unit) if turning_round else None
     # Who started it so must not be kept from stopping it.
-    unit.record.started_unverified |= unit.unverified
+    unit.record.sent.started_unverified |= unit.unverified
     before_start()
     # Before it is sent: whoever is interrupted from here on has to end it.
-    unit.record.starts += 1
+    unit.record.sent.count_start()
     unit.record.started_under = unit.profile
-    unit.record.started_as = State.UNKNOWN if command.startswith("jog") else wanted
+    unit.record.sent.started_as = (State.UNKNOWN if command.startswith("jog") else wanted).value
     prepared = await commands.prepared(unit, command, setpoint)
     if not before.state.running:
         await start_sequence.lead_up(unit, command, confirm)
@@ -285,77 +283,7 @@ async def _halt(unit: DriveView, command: str, confirm: float, within: float, *,
     unit = halting(unit, command)
     unit.evidence.require_command(command)
     can_coast = coasts and unit.evidence.unusable("coast") is None
-    halt = Halt(unit, (command, command, command, "coast") if can_coast else (command,), within)
-    await halt.until_taken()
-    while True:
-        proof = await prove(halt, confirm)
-        try:
-            while not await proof.look():
-                await unit.bus.sleep(proof.pause)
-        except Unconfirmed:
-            if not halt.is_confirmed and not halt.is_over:
-                # What was only acknowledged may not have been carried out.
-                await halt.until_taken()
-            elif not await halt.vouch_anew():
-                raise
-        else:
-            if confirm == 0.0 or not await halt.was_another():
-                return
-
-
-async def prove(halt: Halt, within: float) -> commands.Proof:
-    """The looks that prove a *halt* that was taken, once the unit has said that it is what was halted.
-
-    One that says it is something else is halted as that first.
-
-    Raises:
-        NotAllowed, Refused, NoAnswer, BadAnswer, PortError, Unconfirmed: It is not halted as what it is, or does not
-            say what that is.
-    """
-    await halt.vouch()
-    return _proof_of_halt(halt.unit, halt.command, halt.sent, halt.confirmed, within)
-
-
-def _proof_of_halt(unit: DriveView, command: str, sent: float, confirmed: float, within: float) -> commands.Proof:
-    """The looks that prove a *command* that halts, *sent* and *confirmed* at these times of the line's clock.
-
-    Where the family has no state that may be used, the confirmation is all there is: nothing is left to be proved.
-    """
-    # From here on; what it was looked at before does not count.
-    fall = Fall(sent, confirmed, unit.bus.now() - confirmed + within)
-    # What coasts has no ramp, and what jogs is not at its setpoint.
-    by_ramp = command == "stop"
-    ramp: speed.Ramp | None = None
-
-    async def shows(seen: Look) -> bool:
-        nonlocal by_ramp, ramp
-        asked = unit.bus.now()
-        turns = await speed.turns_in_spite_of(unit, seen.state, urgent=True)
-        if seen.state.at_rest and not turns:
-            return fall.rests(asked)
-        fall.goes_on()
-        if not (seen.state.running or turns):
-            return False
-        frequency, setpoint = await speed.frequencies(unit, urgent=True)
-        if frequency is None:
-            return False
-        fall.see(frequency, setpoint, asked, unit.bus.now())
-        by_ramp &= seen.source in (ControlSource.COMMUNICATION, None) and _turns_as_started(unit, seen.state)
-        if ramp is None and fall.is_worth_asking():
-            ramp = await speed.ramp(unit, urgent=True)
-            # One that is slow to say nothing of it has still been falling meanwhile.
-            fall.wait(unit.bus.now() - fall.seen_at)
-        if ramp is None or ramp.slope is None:
-            return False
-        return fall.goes_along(ramp.slope) and ramp.only_by_bus and by_ramp
-
-    told = unit.evidence.without_state() is None
-    return commands.Proof(unit, command, shows, within if told else 0.0, fall)
-
-
-def _turns_as_started(unit: DriveView, seen: State) -> bool:
-    """Whether it turns as it was started here last, if it was: not the other way still, nor maybe in a jog."""
-    return unit.record.started_as in (None, seen)
+    await Halt(unit, command, confirm, within, coasts=can_coast).carry_out()
 
 
 def halting(unit: DriveView, command: str) -> DriveView:

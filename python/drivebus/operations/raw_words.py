@@ -62,7 +62,7 @@ async def write_words(unit: DriveView, address: int, value: int | Sequence[int],
     if not checks.flag("force", force):
         check_words([unit.profile], unit.address, address, words)
     if unit.profile.is_command(address):
-        unit.record.started_as = State.UNKNOWN
+        unit.record.sent.started_as = State.UNKNOWN.value
     await write(unit, address, words, force=force)
 
 

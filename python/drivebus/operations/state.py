@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from drivebus._native import Looks
 from drivebus.errors import BadArgument
@@ -23,12 +23,14 @@ __all__ = [
     "fault",
     "fault_history",
     "glance",
+    "keep",
     "look",
     "ping",
     "planned",
     "read_off",
     "remember",
     "seen_last",
+    "shown",
     "state",
     "state_of",
     "state_word",
@@ -64,13 +66,22 @@ async def glance(unit: DriveView, *, urgent: bool = False) -> Look:
     plan = planned(unit.evidence)
     if plan.looks.is_blind:
         return Look(State.UNKNOWN, {}, None, 0.0, plan.missing, False, None)
-    told = await raw_words.carried_out_of(unit, plan.looks.look(unit.address, urgent))
+    seen = shown(unit, await raw_words.carried_out_of(unit, plan.looks.look(unit.address, urgent)))
+    keep(unit, seen)
+    return seen
+
+
+def shown(unit: DriveView, told: Any) -> Look:
+    """What a look at *unit* showed, of which the core *told*."""
     doing, word, number, in_fault, fields, asked = told
     fault = unit.profile.fault(number) if number else None
-    seen = Look(State(doing), dict(fields), fault, asked, plan.missing, in_fault, word)
+    return Look(State(doing), dict(fields), fault, asked, planned(unit.evidence).missing, in_fault, word)
+
+
+def keep(unit: DriveView, seen: Look) -> None:
+    """Keeps what was *seen*, and tells what changed since the look before."""
     remember(unit, str(seen))
     events.saw(unit, seen.state, str(seen.fault or "not named") if seen.tripped else None)
-    return seen
 
 
 async def state(unit: DriveView, *, unverified: bool = False) -> State:
@@ -231,11 +242,11 @@ def remember(unit: DriveView, seen: str) -> None:
     unit.record.last_state = (seen, unit.bus.now())
 
 
-def seen_last(unit: DriveView) -> str:
-    """The last state that was seen, and how long ago on the line's clock."""
+def seen_last(unit: DriveView, now: float | None = None) -> str:
+    """The last state that was seen, and how long ago on the line's clock: before *now*, if that is given."""
     if unit.record.last_state is None:
         return "no state was ever seen"
     seen, at = unit.record.last_state
     # A line that is lost may have no clock.
-    age = max(unit.bus.now() - at, 0.0)
+    age = max((unit.bus.now() if now is None else now) - at, 0.0)
     return f"state seen last, {age:.1f} s ago: {seen}"

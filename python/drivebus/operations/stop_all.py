@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from drivebus import checks
-from drivebus.errors import BadArgument, DrivebusError, NotStopped, Unconfirmed
-from drivebus.operations import commands, motion
+from drivebus.errors import BadArgument, DrivebusError, NotStopped
+from drivebus.operations import motion
 from drivebus.operations.aim import goes_out_at_once
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.halting import WITHIN, Halt
@@ -26,46 +26,15 @@ class _Stop:
     def __init__(self, unit: DriveView, confirm: float, within: float) -> None:
         self.address = unit.address
         self.failure: DrivebusError | None = None
-        self._unit, self._confirm = motion.halting(unit, _STOP), confirm
-        self._halt = Halt(self._unit, (_STOP,), within)
-        self._proof: commands.Proof | None = None
+        self.halt = Halt(motion.halting(unit, _STOP), _STOP, confirm, within)
 
     async def advance(self) -> bool:
-        """Does the next thing: sends, asks what it is, or looks. Whether nothing is left to be done."""
+        """Does the next thing. Whether nothing is left to be done."""
         try:
-            return await self._next()
+            return await self.halt.advance()
         except DrivebusError as error:
             self.failure = error
             return True
-
-    async def _next(self) -> bool:
-        if self._proof is not None:
-            try:
-                if not await self._proof.look():
-                    return False
-                if self._confirm == 0.0 or not await self._halt.was_another():
-                    return True
-            except Unconfirmed:
-                if not await self._halt.vouch_anew():
-                    raise
-            self._proof = None
-        if self._halt.is_taken:
-            self._proof = await motion.prove(self._halt, self._confirm)
-            return False
-        self._unit.evidence.require_command(_STOP)
-        if not await self._halt.step() and self._halt.is_over:
-            raise await self._halt.failure()
-        return False
-
-    @property
-    def pause(self) -> float:
-        """Seconds until there is something to do again."""
-        return commands.POLL_INTERVAL if self._proof is None else self._proof.pause
-
-    def wait(self, seconds: float) -> None:
-        """For *seconds* others were seen to: its proof does not count them."""
-        if self._proof is not None:
-            self._proof.wait(seconds)
 
 
 async def stop_all(
@@ -97,9 +66,9 @@ async def stop_all(
             took = bus.now() - began
             for other in pending:
                 if other is not stop:
-                    other.wait(took)
+                    other.halt.wait(took)
         if pending:
-            await bus.sleep(min(stop.pause for stop in pending))
+            await bus.sleep(min(stop.halt.pause for stop in pending))
     failures = {stop.address: stop.failure for stop in stops if stop.failure is not None}
     if failures:
         raise _not_stopped(len(stops), failures)

@@ -3,10 +3,11 @@
 use std::fmt;
 use std::time::Duration;
 
-use drivebus_drives::Place;
+use drivebus_drives::{Command, Place};
 use drivebus_rtu::UnitAddress;
 
 use super::Outcome;
+use crate::look::Look;
 
 /// What an operation wants done before it goes on.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,15 +15,21 @@ use super::Outcome;
 pub enum Wish {
     /// Words of a unit.
     Read(Read),
+    /// Words to a unit.
+    Write(Write),
     /// Time, on the line's clock.
     Sleep(Duration),
+    /// That whoever drives hears this now, and goes on.
+    Tell(Notice),
 }
 
 impl Wish {
     /// Whether `outcome` may come of it.
     pub(super) fn is_met_by<E>(&self, outcome: &Outcome<E>) -> bool {
         match (self, outcome) {
-            (_, Outcome::Failed(_)) | (Self::Sleep(_), Outcome::Slept) => true,
+            // Who is told something has nothing to say to it.
+            (Self::Tell(_), outcome) => matches!(outcome, Outcome::Heard),
+            (_, Outcome::Failed(_)) | (Self::Sleep(_), Outcome::Slept) | (Self::Write(_), Outcome::Written) => true,
             (Self::Read(read), Outcome::Words(words)) => !read.is_stamped && read.takes(words),
             (Self::Read(read), Outcome::Stamped(stamped)) => read.is_stamped && read.takes(&stamped.words),
             _ => false,
@@ -34,7 +41,10 @@ impl fmt::Display for Wish {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Read(read) => read.fmt(f),
+            Self::Write(write) => write.fmt(f),
             Self::Sleep(time) => write!(f, "{time:?} of the line's clock"),
+            Self::Tell(Notice::Took(command)) => write!(f, "to tell that {} was taken", command.name()),
+            Self::Tell(Notice::Saw(look)) => write!(f, "to tell that a look showed {look}"),
         }
     }
 }
@@ -107,4 +117,74 @@ pub struct Stamped {
     pub asked: Duration,
     /// When the answer was complete.
     pub answered: Duration,
+}
+
+/// A write of words, or of one coil. It is sent once.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Write {
+    /// Who gets it.
+    pub unit: UnitAddress,
+    /// Where the first word goes.
+    pub place: Place,
+    /// What goes there.
+    pub payload: Payload,
+    /// Before all who wait for the line, whatever is in doubt.
+    pub is_urgent: bool,
+    /// Where the same can be read: there a confirmation that is missing is looked for.
+    pub read_back: Option<u16>,
+    /// How often the port had been opened again when it was seen who answers: at another number nothing is sent.
+    pub connection: Option<u64>,
+    /// How often the unit had been told to halt when this was decided on: at another number nothing is sent.
+    pub halts: Option<u64>,
+    /// Whether it goes out also where the line knows the unit as one of a family that does not define it.
+    pub is_forced: bool,
+    /// How long this write alone waits for its confirmation; `None` is what the line has.
+    pub timeout: Option<Duration>,
+}
+
+/// What a write carries.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Payload {
+    /// One word by 06H, or a coil by 05H.
+    Word(u16),
+    /// 1..=123 words by 10H.
+    Words(Vec<u16>),
+}
+
+impl Write {
+    /// A write to `unit` at `place`, as the line writes.
+    pub const fn new(unit: UnitAddress, place: Place, payload: Payload) -> Self {
+        Self {
+            unit,
+            place,
+            payload,
+            is_urgent: false,
+            read_back: None,
+            connection: None,
+            halts: None,
+            is_forced: false,
+            timeout: None,
+        }
+    }
+}
+
+impl fmt::Display for Write {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { unit, place, payload, .. } = self;
+        match payload {
+            Payload::Word(word) => write!(f, "a write of {word:04X}H to {place} of unit {}", unit.get()),
+            Payload::Words(words) => write!(f, "a write of {} words from {place} of unit {}", words.len(), unit.get()),
+        }
+    }
+}
+
+/// What has come about, for whoever keeps or shows it: nothing is asked by it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Notice {
+    /// The unit took this command, as it says.
+    Took(Command),
+    /// A look showed this.
+    Saw(Look),
 }

@@ -1,0 +1,361 @@
+//! A halt on its way: sent until the unit takes it, one frame after another, for as long as was said; and then proved.
+//!
+//! A halt that was lost, refused because a frame arrived damaged, or put off by a drive that is busy, halts nothing. So it
+//! is sent again: every halt is an absolute word, and a motor that was told twice to stop stops once. What ends it is a
+//! confirmation, or the time. Nothing else that moves a motor is ever repeated.
+//!
+//! What proves it is what the drive shows afterwards: standstill, or a [`Fall`](crate::Fall) along its ramp. Where the family
+//! has no state that may be used, the confirmation is all there is.
+
+mod not_halted;
+mod proof;
+mod taken;
+mod vouching;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use drivebus_drives::Command;
+use drivebus_rtu::{Instant, Meaning};
+
+pub use not_halted::{After, LastLook, NotHalted, Tries, Why};
+pub use taken::Taken;
+
+use crate::aim::{ANSWER_WITHIN, Aim, NotTaken, Target};
+use crate::asked::NotTold;
+use crate::families::Families;
+use crate::huanyang::may_be_of;
+use crate::record::Record;
+use crate::task::{Cause, LineError, Mailbox, Notice, Payload, Write};
+use proof::{POLL_INTERVAL, Proof};
+
+/// Time between a frame that came to nothing at once, and the next.
+const PAUSE: Duration = Duration::from_millis(40);
+
+/// Time in which a unit says what it is, on a line that was just opened and loses an answer. One question alone takes a
+/// second there.
+const TO_SAY: Duration = Duration::from_secs(2);
+
+const WRITE_ONE: u8 = 0x06;
+const WRITE_MANY: u8 = 0x10;
+
+/// How a unit is to be halted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Order {
+    /// What is sent first.
+    pub command: Command,
+    /// Whether each fourth frame is a coast, where the ones before were not taken.
+    pub coasts: bool,
+    /// How long it is sent until the unit takes it, an hour at most. A unit that answers, but has not said yet what it is, is
+    /// asked for two seconds in any case.
+    pub within: Duration,
+    /// How long its state is looked at for the proof; zero does not look. A frequency that falls is looked at longer.
+    pub confirm: Duration,
+}
+
+impl Order {
+    fn nth(&self, frame: usize) -> Command {
+        if self.coasts && frame % 4 == 3 { Command::Coast } else { self.command }
+    }
+}
+
+/// One unit that is to be halted.
+#[derive(Debug)]
+pub struct Halt<E> {
+    named: Taken,
+    /// The same, as the family that it is taken for.
+    unit: Taken,
+    record: Record,
+    order: Order,
+    aim: Aim,
+    /// What was sent last.
+    command: Command,
+    told: Vec<Command>,
+    began: Instant,
+    until: Instant,
+    /// The moment before the frame that was taken.
+    sent: Instant,
+    /// When it was.
+    confirmed: Instant,
+    is_taken: bool,
+    /// Whether it confirmed that; a unit may also say that it is still at it, and show nothing.
+    is_confirmed: bool,
+    /// Whether any frame went out.
+    was_sent: bool,
+    heard: Option<Instant>,
+    failure: Option<E>,
+    /// When the last look ended.
+    looked: Instant,
+    proof: Option<Proof>,
+}
+
+impl<E: LineError> Halt<E> {
+    /// A halt of `unit` as `order` says. Nothing is sent yet.
+    pub fn new(unit: Taken, record: &Record, order: Order, families: &Families, now: Instant) -> Self {
+        Self {
+            aim: Aim::new(unit.same().clone(), families, now),
+            named: unit.clone(),
+            unit,
+            record: record.clone(),
+            command: order.command,
+            told: Vec::new(),
+            began: now,
+            until: now + order.within,
+            order,
+            sent: now,
+            confirmed: now,
+            is_taken: false,
+            is_confirmed: false,
+            was_sent: false,
+            heard: None,
+            failure: None,
+            looked: now,
+            proof: None,
+        }
+    }
+
+    /// Halts the unit, and proves it.
+    ///
+    /// # Errors
+    ///
+    /// [`NotHalted`]: the motor may still turn. Its `was_sent` says whether a halt went out.
+    pub async fn carry_out(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), NotHalted<E>> {
+        match self.to_its_proof(line, families).await {
+            Ok(()) => Ok(()),
+            Err(why) => Err(self.not_halted(line, why)),
+        }
+    }
+
+    /// Does the next thing of it: sends, asks what the unit is, or looks. Whether nothing is left to be done.
+    ///
+    /// For who halts several units over one line in turns.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`carry_out`](Self::carry_out).
+    pub async fn advance(&mut self, line: &Mailbox<E>, families: &Families) -> Result<bool, NotHalted<E>> {
+        match self.next(line, families).await {
+            Ok(is_done) => Ok(is_done),
+            Err(why) => Err(self.not_halted(line, why)),
+        }
+    }
+
+    /// Time until there is something to do again.
+    pub fn pause(&self, now: Instant) -> Duration {
+        self.proof.as_ref().map_or(POLL_INTERVAL, |proof| proof.pause(now))
+    }
+
+    /// For `time` others were seen to: its proof does not count that.
+    pub fn wait(&mut self, time: Duration) {
+        if let Some(proof) = &mut self.proof {
+            proof.wait(time);
+        }
+    }
+
+    async fn to_its_proof(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {
+        self.check_order()?;
+        self.until_taken(line, families).await?;
+        loop {
+            let mut proof = self.prove(line, families).await?;
+            let shown = loop {
+                let looked = proof.look(line, &self.unit, &self.record).await;
+                self.looked = line.now();
+                match looked {
+                    Ok(true) => break Ok(()),
+                    Ok(false) => line.sleep(proof.pause(line.now())).await.map_err(Why::Failed)?,
+                    Err(why) => break Err(why),
+                }
+            };
+            match shown {
+                Ok(()) if self.order.confirm.is_zero() || !self.was_another(line, families).await? => return Ok(()),
+                Ok(()) => {}
+                // What was only acknowledged may not have been carried out.
+                Err(why) if why.is_unproved() && !self.is_confirmed && !self.is_over(line) => {
+                    self.until_taken(line, families).await?;
+                }
+                Err(why) if why.is_unproved() => {
+                    if !self.vouch_anew(line, families).await? {
+                        return Err(why);
+                    }
+                }
+                Err(why) => return Err(why),
+            }
+        }
+    }
+
+    async fn next(&mut self, line: &Mailbox<E>, families: &Families) -> Result<bool, Why<E>> {
+        if let Some(mut proof) = self.proof.take() {
+            let looked = proof.look(line, &self.unit, &self.record).await;
+            self.looked = line.now();
+            match looked {
+                Ok(false) => {
+                    self.proof = Some(proof);
+                    return Ok(false);
+                }
+                Ok(true) if self.order.confirm.is_zero() || !self.was_another(line, families).await? => {
+                    return Ok(true);
+                }
+                Ok(true) => {}
+                Err(why) => {
+                    if !why.is_unproved() || !self.vouch_anew(line, families).await? {
+                        return Err(why);
+                    }
+                }
+            }
+        }
+        if self.is_taken {
+            self.proof = Some(self.prove(line, families).await?);
+            return Ok(false);
+        }
+        self.check_order()?;
+        if !self.step(line, families).await? && self.is_over(line) {
+            return Err(self.failure(line).await);
+        }
+        Ok(false)
+    }
+
+    /// Whether its time has passed. A unit that speaks, and did not say yet what it is, is given the time to.
+    fn is_over(&self, line: &Mailbox<E>) -> bool {
+        let is_asked = self.heard.is_some() && self.told.is_empty() && !line.is_closed();
+        let until = if is_asked { self.until.max(self.began + TO_SAY) } else { self.until };
+        line.now() >= until
+    }
+
+    fn check_order(&self) -> Result<(), Why<E>> {
+        self.named.check(self.order.command)
+    }
+
+    async fn until_taken(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {
+        while !self.step(line, families).await? {
+            if self.is_over(line) {
+                return Err(self.failure(line).await);
+            }
+            line.sleep(PAUSE).await.map_err(Why::Failed)?;
+        }
+        Ok(())
+    }
+
+    /// Sends once. Whether the unit took it.
+    async fn step(&mut self, line: &Mailbox<E>, families: &Families) -> Result<bool, Why<E>> {
+        let wanted = self.order.nth(self.told.len());
+        let came = match self.aim.take(line, families, wanted).await {
+            Ok(Some(target)) => {
+                self.take_for(line, target);
+                self.unit.check(self.command)?;
+                self.send(line).await
+            }
+            Ok(None) | Err(NotTaken::NotTold(NotTold::Unreached { .. })) => {
+                self.heard = Some(line.now());
+                return Ok(false);
+            }
+            Err(NotTaken::MayBe(families)) => return Err(Why::Undecided { wanted, families }),
+            Err(NotTaken::NotTold(NotTold::Failed(error) | NotTold::Busy { last: error, .. })) => Err(error),
+        };
+        match came {
+            Ok(()) => self.is_taken = true,
+            Err(error) => self.failed(line, families, error)?,
+        }
+        Ok(self.is_taken)
+    }
+
+    /// From now on it is the `target`, whose command was chosen.
+    fn take_for(&mut self, line: &Mailbox<E>, target: Target) {
+        self.unit = self.named.taken_for(&target.family, &self.record, line.connection());
+        self.command = target.command;
+    }
+
+    /// A frame came to nothing.
+    fn failed(&mut self, line: &Mailbox<E>, families: &Families, error: E) -> Result<(), Why<E>> {
+        match error.cause() {
+            Cause::Refused(..) => {
+                self.heard = Some(line.now());
+                self.failure = Some(error);
+                self.doubt_named(line, families);
+                return Ok(());
+            }
+            Cause::Other => return Err(Why::Failed(error)),
+            Cause::BadAnswer if may_be_of(self.unit.same().unit(), error.raw()) => self.heard = Some(line.now()),
+            Cause::Port if line.is_closed() => self.until = line.now(),
+            Cause::NoAnswer | Cause::BadAnswer | Cause::Port => {}
+        }
+        // That one went out tells more than that a later one could not.
+        if error.was_sent() || self.failure.as_ref().is_none_or(|known| !known.was_sent()) {
+            self.failure = Some(error);
+        }
+        Ok(())
+    }
+
+    /// A halt was refused. A unit that did not say yet what it is may refuse it because it is of another family.
+    fn doubt_named(&self, line: &Mailbox<E>, families: &Families) {
+        if self.is_as_named() && !self.unit.same().identity().is_known(line.connection()) {
+            self.aim.doubt(families);
+        }
+    }
+
+    fn is_as_named(&self) -> bool {
+        Arc::ptr_eq(self.unit.same().family(), self.named.same().family())
+    }
+
+    async fn send(&mut self, line: &Mailbox<E>) -> Result<(), E> {
+        let family = self.unit.same().family();
+        let line = &line.taken_for(family);
+        self.record.note(|sent| sent.halts_begun += 1);
+        self.told.push(self.command);
+        self.sent = line.now();
+        self.is_confirmed = true;
+        let profile = family.profile();
+        for (place, word) in [profile.command_first(self.command), profile.command(self.command)].into_iter().flatten() {
+            let knows = |function| profile.functions().contains(&function);
+            let by_many = !knows(WRITE_ONE) && knows(WRITE_MANY);
+            let payload = if by_many { Payload::Words(vec![word]) } else { Payload::Word(word) };
+            let write = Write {
+                is_urgent: true,
+                // The line knows the unit by its name, and would hold the words of another family back.
+                is_forced: !self.is_as_named(),
+                timeout: Some(ANSWER_WITHIN),
+                ..Write::new(self.unit.same().unit(), place, payload)
+            };
+            let Err(error) = line.write(write).await else {
+                self.was_sent = true;
+                continue;
+            };
+            self.was_sent |= error.was_sent();
+            match error.cause() {
+                Cause::Refused(code, _) if family.meaning_of(code) == Meaning::Taken => self.is_confirmed = false,
+                _ => {
+                    self.record.note(|sent| sent.halts += u64::from(error.was_sent()));
+                    return Err(error);
+                }
+            }
+        }
+        self.record.note(|sent| sent.halts += 1);
+        self.confirmed = line.now();
+        line.tell(Notice::Took(self.command)).await;
+        Ok(())
+    }
+
+    /// Why nothing was taken.
+    async fn failure(&mut self, line: &Mailbox<E>) -> Why<E> {
+        let now = line.now();
+        let since = |moment| now.saturating_duration_since(moment);
+        let Some(last) = self.failure.take() else { return Why::Unsaid };
+        let is_refused = matches!(last.cause(), Cause::Refused(..));
+        if !is_refused && !last.was_sent() {
+            return Why::NotSent(last);
+        }
+        let tries = Tries { told: self.told.clone(), took: since(self.began), heard: self.heard.map(since) };
+        let after = match self.unit.look(line).await {
+            Ok(look) => After::Seen(look),
+            Err(error) if matches!(error.cause(), Cause::Other) => return Why::Failed(error),
+            Err(error) => After::Unread(error),
+        };
+        if is_refused { Why::Refused { last, tries, after } } else { Why::Unanswered { last, tries, after } }
+    }
+
+    fn not_halted(&self, line: &Mailbox<E>, why: Why<E>) -> NotHalted<E> {
+        let same = self.unit.same();
+        let family = Arc::clone(same.family());
+        let found = if why.is_unproved() { self.looked } else { line.now() };
+        NotHalted { unit: same.unit(), family, command: self.command, was_sent: self.was_sent, found, why }
+    }
+}

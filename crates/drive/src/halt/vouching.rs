@@ -1,0 +1,125 @@
+//! Whether what was halted is what the unit says it is. Where it is not, it is halted as that.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::not_halted::Why;
+use super::proof::Proof;
+use super::{Halt, PAUSE};
+use crate::aim::NotTaken;
+use crate::asked::NotTold;
+use crate::contradiction::Contradiction;
+use crate::families::Families;
+use crate::harm::What;
+use crate::task::{Cause, LineError, Mailbox};
+
+/// Time for which a unit that does not show a halt is asked what it is, while it is not heard.
+const ASKED_FOR: Duration = Duration::from_secs(1);
+
+impl<E: LineError> Halt<E> {
+    /// The looks that prove the halt that was taken, once the unit has said that it is what was halted.
+    ///
+    /// One that says it is something else is halted as that first.
+    pub(super) async fn prove(&mut self, line: &Mailbox<E>, families: &Families) -> Result<Proof, Why<E>> {
+        self.vouch(line, families).await?;
+        let moments = (self.sent, self.confirmed);
+        Ok(Proof::new(&self.unit, self.command, moments, self.order.confirm, line.now()))
+    }
+
+    /// Asks nothing of a unit that this line has identified, or that was halted as what it showed.
+    async fn vouch(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {
+        if !self.is_as_named() || self.unit.same().identity().is_known(line.connection()) {
+            return Ok(());
+        }
+        let Some(against) = self.contradiction(line, families).await? else { return Ok(()) };
+        self.aim.doubt(families);
+        match self.once_more(line, families).await {
+            Err(why) if why.is_forbidden() => {
+                Err(Why::Another { against: Some(Box::new(against)), then: Box::new(why) })
+            }
+            done => done,
+        }
+    }
+
+    /// Whether it was halted once more, as another family: it does not show the halt, and shows that family now.
+    ///
+    /// A port that stayed open may have another drive behind it, whatever the line knew of the one before. Where no answer
+    /// comes it is asked again, until none has come for a second: an answer that was lost is no reason to let it run.
+    pub(super) async fn vouch_anew(&mut self, line: &Mailbox<E>, families: &Families) -> Result<bool, Why<E>> {
+        if !self.aim.doubt(families) {
+            return Ok(false);
+        }
+        let began = line.now();
+        let mut heard = began;
+        let target = loop {
+            let failed = match self.aim.take(line, families, self.command).await {
+                Ok(Some(target)) => break target,
+                Ok(None) | Err(NotTaken::NotTold(NotTold::Unreached { .. } | NotTold::Busy { .. })) => {
+                    // One question alone may take seconds: what it heard before the last counts.
+                    let is_silent = self.aim.heard() <= heard && line.now() >= heard + ASKED_FOR;
+                    if is_silent || line.now() >= began + self.order.within {
+                        return Ok(false);
+                    }
+                    heard = heard.max(self.aim.heard());
+                    line.sleep(PAUSE).await
+                }
+                Err(NotTaken::MayBe(families)) => {
+                    let then = Box::new(Why::Undecided { wanted: self.command, families });
+                    return Err(Why::Another { against: None, then });
+                }
+                Err(NotTaken::NotTold(NotTold::Failed(error))) => Err(error),
+            };
+            if let Err(error) = failed {
+                return match error.cause() {
+                    Cause::Port => Ok(false),
+                    Cause::Other => Err(Why::Another { against: None, then: Box::new(Why::Failed(error)) }),
+                    _ => Err(Why::Failed(error)),
+                };
+            }
+        };
+        let taken = self.named.taken_for(&target.family, &self.record, line.connection());
+        if Arc::ptr_eq(taken.same().family(), self.unit.same().family()) {
+            return Ok(false);
+        }
+        self.unit.same().identity().is_another();
+        self.once_more(line, families).await?;
+        Ok(true)
+    }
+
+    /// Whether it was halted once more, as another family, although it showed the halt: in the words of that one.
+    ///
+    /// Asks nothing of a unit that said lately what it is, nor where the halt does no harm to any family.
+    pub(super) async fn was_another(&mut self, line: &Mailbox<E>, families: &Families) -> Result<bool, Why<E>> {
+        let same = self.unit.same();
+        let is_harmless = || families.harmed(What::Command(self.command), same.family()).is_empty();
+        if !same.identity().is_old(line.now()) || is_harmless() {
+            return Ok(false);
+        }
+        match same.contradiction(line, families, true).await {
+            Ok(None) => Ok(false),
+            Ok(Some(_)) => self.vouch_anew(line, families).await,
+            // What it showed stands: nothing speaks against it.
+            Err(error) if error.cause().is_of_the_line() => Ok(false),
+            Err(error) => Err(Why::Failed(error)),
+        }
+    }
+
+    /// Sends it anew, for as long again.
+    async fn once_more(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {
+        (self.is_taken, self.until) = (false, line.now() + self.order.within);
+        self.until_taken(line, families).await
+    }
+
+    /// What the unit says against its name; asked for until it is answered, for as long as a halt is sent.
+    async fn contradiction(&self, line: &Mailbox<E>, families: &Families) -> Result<Option<Contradiction>, Why<E>> {
+        let until = line.now() + self.order.within;
+        loop {
+            match self.unit.same().contradiction(line, families, true).await {
+                Ok(found) => return Ok(found),
+                Err(error) if !error.cause().is_of_the_line() => return Err(Why::Failed(error)),
+                Err(error) if line.now() >= until || line.is_closed() => return Err(Why::Unasked(error)),
+                Err(_) => line.sleep(PAUSE).await.map_err(Why::Failed)?,
+            }
+        }
+    }
+}
