@@ -31,6 +31,10 @@ const DELAY: Duration = Duration::from_millis(100);
 /// Time for which a motor that was seen running has to be at rest: one that turns round passes through zero.
 const AT_REST: Duration = Duration::from_millis(200);
 
+/// How often a rest is given that time. A state that goes to and fro between rest and motion would be looked at without
+/// end, and nothing else be tried.
+const RESTS: u32 = 16;
+
 /// One look at a motor, whose frequency was what it is at some moment between two.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Glimpse {
@@ -79,6 +83,8 @@ pub struct Fall {
     lowest: f64,
     went_on: bool,
     rests_since: Option<Instant>,
+    /// How often it came to rest.
+    rests: u32,
     looks: Vec<Glimpse>,
     /// Whether a look was off the ramp: whatever comes later, it was not the stop's.
     is_off: bool,
@@ -106,6 +112,7 @@ impl Fall {
             lowest: f64::INFINITY,
             went_on: false,
             rests_since: None,
+            rests: 0,
             looks: Vec::new(),
             is_off: false,
         }
@@ -140,7 +147,10 @@ impl Fall {
     /// It is at rest. Whether that is its standstill, and no passage through zero.
     pub fn rests(&mut self, now: Instant) -> bool {
         let since = *self.rests_since.get_or_insert_with(|| {
-            self.until = self.until.max(now + 2 * AT_REST);
+            self.rests += 1;
+            if self.rests <= RESTS {
+                self.until = self.until.max(now + 2 * AT_REST);
+            }
             now
         });
         !self.went_on || now.saturating_duration_since(since) >= AT_REST

@@ -359,3 +359,6 @@ impl<E: LineError> Halt<E> {
         NotHalted { unit: same.unit(), family, command: self.command, was_sent: self.was_sent, found, why }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use crate::families::Families;
 use crate::family::Family;
-use crate::task::{Cause, LineError, Mailbox, Outcome, Read, Seen, Stamped, Step, Task, Wish};
+use crate::task::{Cause, LineError, Mailbox, Notice, Outcome, Read, Seen, Stamped, Step, Task, Wish, Write};
 
 /// Who is asked.
 pub(crate) const UNIT: UnitAddress = UnitAddress::by_name(5);
@@ -18,6 +18,8 @@ pub(crate) const UNIT: UnitAddress = UnitAddress::by_name(5);
 pub(crate) struct Fault {
     pub(crate) cause: Cause,
     pub(crate) raw: Vec<u8>,
+    /// Whether the request went out.
+    pub(crate) was_sent: bool,
 }
 
 impl std::fmt::Display for Fault {
@@ -36,7 +38,7 @@ impl LineError for Fault {
     }
 
     fn was_sent(&self) -> bool {
-        true
+        self.was_sent
     }
 }
 
@@ -44,13 +46,32 @@ impl LineError for Fault {
 pub(crate) type Reply = Result<u16, Fault>;
 
 /// It fails for this cause, and nothing came.
-pub(crate) fn fails(cause: Cause) -> Reply {
-    Err(Fault { cause, raw: Vec::new() })
+pub(crate) fn fails<T>(cause: Cause) -> Result<T, Fault> {
+    Err(Fault { cause, raw: Vec::new(), was_sent: true })
 }
 
 /// It refuses by this exception, which means what the specification says.
-pub(crate) fn refuses(code: u8) -> Reply {
+pub(crate) fn refuses<T>(code: u8) -> Result<T, Fault> {
     fails(Cause::Refused(ExceptionCode(code), ExceptionCode(code).meaning()))
+}
+
+/// Who answers. What answers reads alone is a function of them.
+pub(crate) trait Unit {
+    /// How it answers the question for one word.
+    fn read(&mut self, read: Read, now: Instant) -> Reply;
+
+    /// What becomes of a write.
+    fn write(&mut self, write: &Write, now: Instant) -> Result<(), Fault>;
+}
+
+impl<F: FnMut(Read) -> Reply> Unit for F {
+    fn read(&mut self, read: Read, _: Instant) -> Reply {
+        self(read)
+    }
+
+    fn write(&mut self, write: &Write, _: Instant) -> Result<(), Fault> {
+        panic!("nobody expects {write}")
+    }
 }
 
 /// A unit that has `words`, besides them what the profile of `family` prints, and of all else says that it has no such
@@ -76,18 +97,36 @@ pub(crate) fn zeros_but(words: &[(u16, u16)]) -> impl FnMut(Read) -> Reply + '_ 
 pub(crate) struct Script {
     pub(crate) now: Instant,
     pub(crate) connection: u64,
+    pub(crate) is_closed: bool,
     pub(crate) asked: Vec<Read>,
+    /// What was written, and when.
+    pub(crate) sent: Vec<(Instant, Write)>,
+    pub(crate) told: Vec<Notice>,
 }
 
 impl Script {
     pub(crate) fn new() -> Self {
-        Self { now: Instant::ZERO, connection: 0, asked: Vec::new() }
+        let (asked, sent, told) = (Vec::new(), Vec::new(), Vec::new());
+        Self { now: Instant::ZERO, connection: 0, is_closed: false, asked, sent, told }
     }
 
-    /// What the operation comes to where `unit` is asked, for each word of a read. Each question takes a millisecond; none is asked without end.
+    /// What the operation comes to where `unit` is asked, for each word of a read. Each request takes a millisecond; none is
+    /// made without end.
     pub(crate) fn carry_out<T, F>(
         &mut self,
-        mut unit: impl FnMut(Read) -> Reply,
+        mut unit: impl Unit,
+        operation: impl FnOnce(Mailbox<Fault>) -> F,
+    ) -> T
+    where
+        F: Future<Output = T> + Send + 'static,
+    {
+        self.carry_out_with(&mut unit, operation)
+    }
+
+    /// The same with a `unit` that goes on afterwards.
+    pub(crate) fn carry_out_with<T, F>(
+        &mut self,
+        unit: &mut impl Unit,
         operation: impl FnOnce(Mailbox<Fault>) -> F,
     ) -> T
     where
@@ -97,17 +136,17 @@ impl Script {
         let mut task = Task::new(operation);
         let mut outcome = None;
         loop {
-            let seen = Seen { now: self.now, connection: self.connection, is_closed: false };
+            let seen = Seen { now: self.now, connection: self.connection, is_closed: self.is_closed };
             outcome = match task.step(seen, outcome).unwrap() {
                 Step::Done(done) => return done,
                 Step::Wish(Wish::Read(read)) => {
                     self.asked.push(read);
-                    assert!(self.asked.len() < 400, "it asks without end");
+                    assert!(self.asked.len() < 4000, "it asks without end");
                     let asked = self.now;
                     self.now = self.now + Duration::from_millis(1);
                     let places = (read.place.address..=u16::MAX).take(read.count.into());
-                    let words = places.map(|address| unit(Read { place: Place { address, ..read.place }, ..read }));
-                    Some(match words.collect() {
+                    let word = |address| unit.read(Read { place: Place { address, ..read.place }, ..read }, self.now);
+                    Some(match places.map(word).collect() {
                         Err(fault) => Outcome::Failed(fault),
                         Ok(words) if read.is_stamped => Outcome::Stamped(Stamped {
                             words,
@@ -117,7 +156,21 @@ impl Script {
                         Ok(words) => Outcome::Words(words),
                     })
                 }
-                Step::Wish(wish) => panic!("it wants {wish}"),
+                Step::Wish(Wish::Write(write)) => {
+                    self.now = self.now + Duration::from_millis(1);
+                    let came = unit.write(&write, self.now);
+                    self.sent.push((self.now, write));
+                    assert!(self.sent.len() < 1000, "it sends without end");
+                    Some(came.map_or_else(Outcome::Failed, |()| Outcome::Written))
+                }
+                Step::Wish(Wish::Sleep(time)) => {
+                    self.now = self.now + time;
+                    Some(Outcome::Slept)
+                }
+                Step::Wish(Wish::Tell(notice)) => {
+                    self.told.push(notice);
+                    Some(Outcome::Heard)
+                }
             };
         }
     }
@@ -148,9 +201,15 @@ pub(crate) fn any_reply() -> impl Strategy<Value = Reply> {
         6 => any::<u8>().prop_map(refuses),
         6 => (0u8..12).prop_map(refuses),
         3 => (proptest::sample::select(vec![Cause::NoAnswer, Cause::BadAnswer]), came)
-            .prop_map(|(cause, raw)| Err(Fault { cause, raw })),
+            .prop_map(|(cause, raw)| Err(Fault { cause, raw, was_sent: true })),
         1 => proptest::sample::select(vec![Cause::Port, Cause::Other]).prop_map(fails),
     ]
+}
+
+/// Whatever becomes of a write.
+pub(crate) fn any_confirmation() -> impl Strategy<Value = Result<(), Fault>> {
+    (any_reply(), any::<bool>())
+        .prop_map(|(reply, was_sent)| reply.map(drop).map_err(|fault| Fault { was_sent, ..fault }))
 }
 
 /// Any shipped family.

@@ -104,7 +104,7 @@ fn silence_is_no_evidence() {
 
 #[test]
 fn a_damaged_answer_may_be_of_the_unit_and_noise_is_not() {
-    let damaged = |raw: &[u8]| Err(Fault { cause: Cause::BadAnswer, raw: raw.to_vec() });
+    let damaged = |raw: &[u8]| Err(Fault { cause: Cause::BadAnswer, raw: raw.to_vec(), was_sent: true });
     let mut other = vec![9, 3, 2, 0, 7];
     other.extend(crc16(&other).to_le_bytes());
     for (raw, is_heard) in [(&[UNIT.get(), 3, 2][..], true), (&[0xFF, 0], false), (&other, false)] {

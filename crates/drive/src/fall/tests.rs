@@ -282,3 +282,16 @@ proptest! {
         prop_assert!(is_on_it || !fall.goes_along(slope));
     }
 }
+
+#[test]
+fn a_state_that_goes_to_and_fro_is_not_looked_at_without_end() {
+    let at = |millis: u64| Instant::ZERO + Duration::from_millis(millis);
+    let mut fall = Fall::new(at(0), at(0), Duration::from_secs(1));
+    let mut now = at(0);
+    while now < fall.until() {
+        fall.goes_on();
+        assert!(!fall.rests(now));
+        now = now + Duration::from_millis(100);
+        assert!(now < at(60_000));
+    }
+}
