@@ -585,6 +585,8 @@ class SameUnit:
         family, as `Family.contradiction` has it; `"unsaid"` and the error of the line; `"put_off"` and what was told;
         `"another"`, what was told before and what is told now.
         """
+    def contradiction(self) -> Task:
+        """Asks the unit what it is. Its result is what speaks against the family, or None."""
 
 def goes_out_at_once(unit: SameUnit, what: str | int, connection: int, /) -> bool:
     """Whether nothing is asked before *what*, as for `Family`, is sent."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -26,23 +26,12 @@ def test_the_corpus_is_there() -> None:
     assert len(FILES) >= 10
 
 
-async def _proved_by_nothing(_: commands.Proof) -> bool:
-    return True
-
-
 def _sent_twice(send: Callable[..., object]) -> Callable[..., object]:
     async def twice(unit: object, name: str, *rest: object) -> None:
         await send(unit, name, *rest)  # type: ignore[misc]
         await send(unit, name, *rest)  # type: ignore[misc]
 
     return twice
-
-
-def _sent_by_nobody(step: Callable[[Halt], Awaitable[bool]]) -> Callable[[Halt], Awaitable[bool]]:
-    async def vanished(halt: Halt) -> bool:
-        return halt.command == "coast" or await step(halt)
-
-    return vanished
 
 
 def found() -> Iterator[str]:
@@ -60,8 +49,20 @@ def test_a_command_that_goes_out_twice_is_found(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_coast_that_is_proved_by_nothing_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Halt, "step", _sent_by_nobody(Halt.step))
-    monkeypatch.setattr(commands.Proof, "look", _proved_by_nothing)
+    begin, carry_out = Halt.__init__, Halt.carry_out
+    coasts: list[Halt] = []
+
+    def begins(halt: Halt, unit: DriveView, command: str, *rest: float, **more: bool) -> None:
+        begin(halt, unit, command, *rest, **more)
+        if command == "coast":
+            coasts.append(halt)
+
+    async def vanishes(halt: Halt) -> None:
+        if halt not in coasts:
+            await carry_out(halt)
+
+    monkeypatch.setattr(Halt, "__init__", begins)
+    monkeypatch.setattr(Halt, "carry_out", vanishes)
     assert any("it was not halted" in said for said in found())
 
 

@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import pytest
 
-from drivebus import Bus, Drive, DrivebusError, NotStopped, Simulator, Unconfirmed
-from drivebus.identify.same_unit import SameUnit
-from drivebus.operations.aim import Aim, Target
+from drivebus import Bus, Drive, DrivebusError, NoAnswer, NotStopped, Simulator, Unconfirmed
+from drivebus.line.asking import Read, Write
+from drivebus.line.blocking import BlockingBus
 
 
 class Cable:
@@ -97,8 +97,10 @@ def runs(unit: Simulator) -> bool:
 def test_one_that_the_halt_of_another_started_is_halted_as_itself(
     line: Line, by: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(SameUnit, "is_old", lambda *_: True)
+    now = BlockingBus.now
     line.cable.move()
+    # It is long ago that it said what it is.
+    monkeypatch.setattr(BlockingBus, "now", lambda bus: now(bus) + 20.0)
     with suppress(DrivebusError):
         line.drive.stop() if by == "stop" else line.bus.stop_all()
     assert not runs(line.comes)
@@ -123,22 +125,17 @@ def test_what_shows_no_halt_is_asked_what_it_is(line: Line) -> None:
 @pytest.mark.parametrize("line", [("gd350", "ms300")], indirect=True)
 def test_an_answer_that_is_lost_leaves_it_not_running(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is asked what it is until it says so: the line lost the first two answers."""
-    take, doubt = Aim.take, Aim.doubt
-    lost: list[str] = []
-    doubted: list[Aim] = []
+    ask = BlockingBus.ask
+    lost: list[Read] = []
 
-    async def lost_twice(aim: Aim, command: str) -> Target | None:
-        if aim in doubted and len(lost) < 2:
-            lost.append(command)
-            return None
-        return await take(aim, command)
+    async def lost_twice(bus: BlockingBus, request: Read | Write) -> list[int] | None:
+        # Before a halt it is given less time to answer.
+        if isinstance(request, Read) and request.timeout is not None and len(lost) < 2:
+            lost.append(request)
+            raise NoAnswer("lost", unit=request.unit, started=0.0)
+        return await ask(bus, request)
 
-    def remembered(aim: Aim) -> bool:
-        doubted.append(aim)
-        return doubt(aim)
-
-    monkeypatch.setattr(Aim, "take", lost_twice)
-    monkeypatch.setattr(Aim, "doubt", remembered)
+    monkeypatch.setattr(BlockingBus, "ask", lost_twice)
     line.cable.move()
     with suppress(DrivebusError):
         line.drive.coast(confirm=0.3)
@@ -148,8 +145,10 @@ def test_an_answer_that_is_lost_leaves_it_not_running(line: Line, monkeypatch: p
 
 @pytest.mark.parametrize("line", [("gd350", "eds300")], indirect=True)
 def test_a_value_is_not_written_to_it_afterwards(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(SameUnit, "is_old", lambda *_: True)
+    now = BlockingBus.now
     line.cable.move()
+    # It is long ago that it said what it is.
+    monkeypatch.setattr(BlockingBus, "now", lambda bus: now(bus) + 20.0)
     with suppress(DrivebusError):
         line.drive.stop()
     before = line.comes.drive(1).eeprom_writes

@@ -304,7 +304,8 @@ impl<E: LineError> Halt<E> {
         self.sent = line.now();
         self.is_confirmed = true;
         let profile = family.profile();
-        for (place, word) in [profile.command_first(self.command), profile.command(self.command)].into_iter().flatten() {
+        for (place, word) in [profile.command_first(self.command), profile.command(self.command)].into_iter().flatten()
+        {
             let knows = |function| profile.functions().contains(&function);
             let by_many = !knows(WRITE_ONE) && knows(WRITE_MANY);
             let payload = if by_many { Payload::Words(vec![word]) } else { Payload::Word(word) };

@@ -112,11 +112,7 @@ impl Script {
 
     /// What the operation comes to where `unit` is asked, for each word of a read. Each request takes a millisecond; none is
     /// made without end.
-    pub(crate) fn carry_out<T, F>(
-        &mut self,
-        mut unit: impl Unit,
-        operation: impl FnOnce(Mailbox<Fault>) -> F,
-    ) -> T
+    pub(crate) fn carry_out<T, F>(&mut self, mut unit: impl Unit, operation: impl FnOnce(Mailbox<Fault>) -> F) -> T
     where
         F: Future<Output = T> + Send + 'static,
     {

@@ -27,6 +27,8 @@ pub struct Error {
     message: String,
     /// What is known of the call where there was one.
     call: Option<Box<CallError>>,
+    /// Whether the unit may have done what was asked by several calls.
+    has_acted: bool,
 }
 
 impl Error {
@@ -37,7 +39,12 @@ impl Error {
 
     /// An error of this kind, of no one call.
     pub(crate) fn of(kind: ErrorKind, why: impl fmt::Display) -> Self {
-        Self { kind, message: why.to_string(), call: None }
+        Self { kind, message: why.to_string(), call: None, has_acted: false }
+    }
+
+    /// The same, of several calls by which the unit may have done what was asked, where that is so.
+    pub(crate) fn having_acted(self, has_acted: bool) -> Self {
+        Self { has_acted, ..self }
     }
 
     /// What kind of failure it is, and so by whose fault.
@@ -47,7 +54,7 @@ impl Error {
 
     /// Whether the unit may have done what was asked: the request went out, and the unit did not refuse it.
     pub fn may_have_acted(&self) -> bool {
-        self.call.as_ref().is_some_and(|call| call.may_have_acted())
+        self.has_acted || self.call.as_ref().is_some_and(|call| call.may_have_acted())
     }
 
     /// The unit's exception code, where it refused. What it means in this family, [`Profile::exception`] knows.
@@ -94,14 +101,14 @@ impl From<Box<CallError>> for Error {
             Failure::Refused { code, .. } => format!("{call} ({} by the specification)", code.standard_name()),
             _ => call.to_string(),
         };
-        Self { kind: call.kind(), message, call: Some(call) }
+        Self { kind: call.kind(), message, call: Some(call), has_acted: false }
     }
 }
 
 impl From<Failure> for Error {
     /// A failure outside any call: the port's, or the bus was closed.
     fn from(failure: Failure) -> Self {
-        Self { kind: failure.kind(), message: failure.to_string(), call: None }
+        Self::of(failure.kind(), failure)
     }
 }
 

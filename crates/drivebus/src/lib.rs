@@ -53,8 +53,8 @@
 //!
 //! # Limits
 //!
-//! - It finds out what a unit is and what it does, and moves nothing: what runs, stops and proves that it stopped is in the
-//!   Python package. A program that moves motors from here writes the words and confirms them itself.
+//! - It finds out what a unit is and what it does, and [halts](Bus::halt) it. What starts a motor is in the Python package: a
+//!   program that moves motors from here writes the words and confirms them itself.
 //! - It is no safety function. An emergency stop is a wire.
 
 #![forbid(unsafe_code)]
@@ -64,6 +64,7 @@ mod builder;
 mod bus;
 mod checks;
 mod error;
+mod halting;
 mod operations;
 mod options;
 mod payload;
@@ -76,6 +77,7 @@ mod simulated;
 pub use builder::Builder;
 pub use bus::Bus;
 pub use error::Error;
+pub use halting::Halting;
 pub use options::CallOptions;
 pub use payload::Payload;
 pub use poll::{Poll, Sample, Target};

@@ -5,7 +5,9 @@
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use drivebus_drive::task::{Cause, LineError, Misuse, Outcome, Read, Seen, Stamped, Step, Task, Wish};
+use drivebus_drive::task::{
+    Cause, LineError, Misuse, Outcome, Payload as Words, Read, Seen, Stamped, Step, Task, Wish, Write,
+};
 use drivebus_drive::{self as drive, Families, Identification, Look, Looks, NotTold};
 use drivebus_line::{Done, ErrorKind};
 use drivebus_rtu::{Answer, ExceptionCode, Instant};
@@ -13,7 +15,9 @@ use drivebus_rtu::{Answer, ExceptionCode, Instant};
 use crate::bus::Bus;
 use crate::checks;
 use crate::error::Error;
+use crate::halting::Halting;
 use crate::options::CallOptions;
+use crate::payload::Payload;
 use crate::replies;
 
 impl LineError for Error {
@@ -78,6 +82,24 @@ pub(crate) fn options_of(read: &Read) -> CallOptions {
     if read.is_urgent { options.urgent() } else { options }
 }
 
+/// What a write of an operation carries.
+pub(crate) fn payload_of(write: &Write) -> Payload<'_> {
+    match &write.payload {
+        Words::Word(word) => Payload::from(*word),
+        Words::Words(words) => Payload::from(words.as_slice()),
+    }
+}
+
+/// What a write of an operation wants otherwise than its bus. This bus knows no family of its units, and holds no word back.
+pub(crate) fn options_of_write(write: &Write) -> CallOptions {
+    let options = CallOptions::new();
+    let options = write.timeout.map_or(options, |timeout| options.timeout(timeout));
+    let options = write.read_back.map_or(options, |address| options.read_back(address));
+    let options = write.connection.map_or(options, |connection| options.connection(connection));
+    let options = write.halts.map_or(options, |halts| options.halts(halts));
+    if write.is_urgent { options.urgent() } else { options }
+}
+
 impl Bus {
     /// Finds out what `unit` is: by its identification code, or by which words it answers and which it refuses.
     ///
@@ -127,6 +149,40 @@ impl Bus {
         self.carry_out(look(unit, looks)?)
     }
 
+    /// Halts a unit, and proves it: it is told until it takes that, and then looked at until its own state shows it.
+    ///
+    /// A halt goes before all who wait for the line, as do the looks that prove it. It returns when the unit stands; or, of a
+    /// stop, after half a second and a hertz along the ramp that is set in the drive, where only the bus commands it. Where
+    /// the family has no state that may be used, the unit's confirmation is all there is. Each halt is an absolute word, so
+    /// one that is lost, or refused, is sent again.
+    ///
+    /// A unit that has not said yet what it is is asked before, where the word may start a drive of another family: one that
+    /// shows another shipped family is halted as that.
+    ///
+    /// ```
+    /// use drivebus::{Bus, Halting, Profile};
+    ///
+    /// # #[cfg(feature = "sim")] {
+    /// let bus = Bus::open("sim://gd350?clock=virtual")?;
+    /// bus.halt(&Halting::coast(1, &Profile::builtin("gd350")?)?)?;
+    /// # }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// The motor may still turn. Whether the drive may have taken a halt, [`may_have_acted`](Error::may_have_acted) says.
+    ///
+    /// | kind | |
+    /// | --- | --- |
+    /// | [`NotAllowed`](ErrorKind::NotAllowed) | nothing was sent: a time is out of range, the command is not printed for the family, or the unit may be one of several families that want other words |
+    /// | [`Refused`](ErrorKind::Refused) | the drive did not take it, in all that time: what it was doing before, it still does |
+    /// | [`Port`](ErrorKind::Port), [`NoAnswer`](ErrorKind::NoAnswer), [`BadAnswer`](ErrorKind::BadAnswer) | it could not be sent |
+    /// | [`Unconfirmed`](ErrorKind::Unconfirmed) | it went out, and is not proved; or the unit never said what it is, and nothing was sent |
+    pub fn halt(&self, halting: &Halting) -> Result<(), Error> {
+        self.carry_out(halting.task(self)?)
+    }
+
     /// Carries an operation out: does what the `task` wishes for, one thing after another, until it is done.
     ///
     /// # Errors
@@ -143,6 +199,13 @@ impl Bus {
                     Outcome::Slept
                 }
                 Step::Wish(Wish::Read(read)) => self.came_of(&read).unwrap_or_else(Outcome::Failed),
+                Step::Wish(Wish::Write(write)) => {
+                    let options = options_of_write(&write);
+                    let came = self.write_with(write.unit.get(), write.place, payload_of(&write), options);
+                    came.map_or_else(Outcome::Failed, |()| Outcome::Written)
+                }
+                // Nobody keeps or shows here what comes about.
+                Step::Wish(Wish::Tell(_)) => Outcome::Heard,
                 Step::Wish(wish) => return Err(unknown(&wish)),
             });
         }

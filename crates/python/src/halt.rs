@@ -116,7 +116,9 @@ fn told_of(py: Python<'_>, why: Why<Failed>) -> PyResult<(&'static str, Py<PyAny
         Why::Undecided { wanted, families } => ("undecided", (wanted.name(), names(&families)).into_py_any(py)?),
         Why::Unsaid => ("unsaid", py.None()),
         Why::NotSent(error) => ("not_sent", raised(error).into_py_any(py)?),
-        Why::Refused { last, tries, after } => ("refused", (raised(last), sent(tries), seen(py, after)?).into_py_any(py)?),
+        Why::Refused { last, tries, after } => {
+            ("refused", (raised(last), sent(tries), seen(py, after)?).into_py_any(py)?)
+        }
         Why::Unanswered { last, tries, after } => {
             ("unanswered", (raised(last), sent(tries), seen(py, after)?).into_py_any(py)?)
         }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use drivebus_drive::{self as drive, Families, NotSame};
+use drivebus_drive::{self as drive, Contradiction, Families, NotSame};
 use pyo3::prelude::*;
 
 use crate::clock::moment;
@@ -52,6 +52,15 @@ impl SameUnit {
     fn check(&self, judged: bool, urgent: bool) -> Task {
         let same = self.core();
         Task::of(|line| async move { same.check(&line, Families::shipped(), judged, urgent).await }, checked)
+    }
+
+    fn contradiction(&self) -> Task {
+        let same = self.core();
+        let told = |py: Python<'_>, found: Result<Option<Contradiction>, Failed>| {
+            let found = found?.map(|found| against(py, found)).transpose()?;
+            Ok(found.into_pyobject(py)?.unbind())
+        };
+        Task::of(|line| async move { same.contradiction(&line, Families::shipped(), false).await }, told)
     }
 }
 

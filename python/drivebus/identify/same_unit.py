@@ -85,6 +85,11 @@ class SameUnit:
             raise type(told)(f"{self._unsaid()} ({told}); nothing was written", unit=self._unit, raw=told.raw) from told
         raise WrongDrive(self._not_same(kind, told), unit=self._unit)
 
+    async def contradiction(self, bus: AwaitableBus) -> str | None:
+        """What the unit says against its profile, and what to do; None if nothing. Asks it in any case."""
+        against = await carried_out(self.seen_as(self._profile).contradiction(), bus)
+        return None if against is None else in_words(self._profile, self._unit, against)
+
     def _not_same(self, kind: str, told: Any) -> str:
         if kind == "contradicts":
             return Text(in_words(self._profile, self._unit, told), "; nothing was written to it")

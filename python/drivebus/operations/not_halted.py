@@ -15,9 +15,7 @@ from drivebus.values import ControlSource
 __all__ = ["in_words"]
 
 
-def in_words(
-    named: DriveView, unit: DriveView, command: str, found: float, reason: str, told: Any
-) -> DrivebusError:
+def in_words(named: DriveView, unit: DriveView, command: str, found: float, reason: str, told: Any) -> DrivebusError:
     """Why *command* is not known to have halted *unit*, which was *named* so.
 
     Args:

@@ -101,12 +101,7 @@ impl Proof {
     }
 
     /// What is seen now, and whether that proves it.
-    async fn see<E: LineError>(
-        &mut self,
-        line: &Mailbox<E>,
-        unit: &Taken,
-        record: &Record,
-    ) -> Result<(Look, bool), E> {
+    async fn see<E: LineError>(&mut self, line: &Mailbox<E>, unit: &Taken, record: &Record) -> Result<(Look, bool), E> {
         let look = unit.look(line).await?;
         let is_shown = self.is_shown_by(&look, line, unit, record).await?;
         Ok((look, is_shown))

@@ -94,16 +94,14 @@ fn halt(family: &Arc<Family>, order: Order, unit: impl Unit) -> Halted {
 fn halt_over(mut script: Script, family: &Arc<Family>, order: Order, unit: impl Unit) -> Halted {
     let record = Record::default();
     let mut halt = of(family, order, &record);
-    let done =
-        script.carry_out(unit, |line| async move { halt.carry_out(&line, Families::shipped()).await });
+    let done = script.carry_out(unit, |line| async move { halt.carry_out(&line, Families::shipped()).await });
     Halted { script, record, done }
 }
 
 fn of(family: &Arc<Family>, order: Order, record: &Record) -> Halt<Fault> {
     let same = SameUnit::new(UNIT, family, &Identity::new(0), false);
     let profile = family.profile();
-    let unit =
-        Taken::as_named(same, &Arc::new(Looks::new(profile, true)), &Arc::new(Speeds::new(profile, true)));
+    let unit = Taken::as_named(same, &Arc::new(Looks::new(profile, true)), &Arc::new(Speeds::new(profile, true)));
     Halt::new(unit, record, order, Families::shipped(), Instant::ZERO)
 }
 
@@ -238,7 +236,10 @@ fn a_state_that_never_shows_it_is_no_proof() {
     assert_eq!(halted.words(), [5]);
     let error = halted.done.unwrap_err();
     assert!(error.was_sent);
-    assert!(matches!(error.why, Why::Unshown(LastLook::Seen { ref look, .. }) if look.state == State::Forward), "{error}");
+    assert!(
+        matches!(error.why, Why::Unshown(LastLook::Seen { ref look, .. }) if look.state == State::Forward),
+        "{error}"
+    );
 }
 
 /// It is set to lose 5 Hz in a second.
@@ -277,7 +278,8 @@ fn nothing_is_sent_where_it_may_start_the_motor() {
     assert!(halted.script.sent.is_empty() && !error.was_sent);
     assert!(matches!(error.why, Why::Undecided { wanted: Command::Stop, .. }), "{error}");
     // One that is always busy never says what it is, and is asked for two seconds.
-    let halted = halt(&shipped("eds300"), Order { within: Duration::ZERO, ..order(Command::Stop) }, Mute(|_| refuses(6)));
+    let halted =
+        halt(&shipped("eds300"), Order { within: Duration::ZERO, ..order(Command::Stop) }, Mute(|_| refuses(6)));
     assert!(halted.script.sent.is_empty());
     assert!(halted.script.now >= Instant::ZERO + TO_SAY);
     assert!(matches!(halted.why(), Why::Unsaid));

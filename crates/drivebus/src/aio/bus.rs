@@ -16,6 +16,7 @@ use crate::builder::Builder;
 use crate::bus::once;
 use crate::checks;
 use crate::error::Error;
+use crate::halting::Halting;
 use crate::operations;
 use crate::options::CallOptions;
 use crate::payload::Payload;
@@ -142,6 +143,16 @@ impl Bus {
         self.carry_out(operations::look(unit, looks)?).await
     }
 
+    /// Halts a unit, and proves it: as [`Bus::halt`](crate::Bus::halt). Where this future is dropped, a halt that was not
+    /// sent yet is not sent, and one that was is not proved.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Bus::halt`](crate::Bus::halt).
+    pub async fn halt(&self, halting: &Halting) -> Result<(), Error> {
+        self.carry_out(halting.task(&self.0)?).await
+    }
+
     /// Carries an operation out: as [`Bus::carry_out`](crate::Bus::carry_out). Where this future is dropped, it ends where it
     /// stands.
     ///
@@ -158,6 +169,14 @@ impl Bus {
                     self.sleep(time).await.map_or_else(Outcome::Failed, |()| Outcome::Slept)
                 }
                 Step::Wish(Wish::Read(read)) => self.came_of(read).await.unwrap_or_else(Outcome::Failed),
+                Step::Wish(Wish::Write(write)) => {
+                    let options = operations::options_of_write(&write);
+                    let written =
+                        self.write_with(write.unit.get(), write.place, operations::payload_of(&write), options);
+                    written.await.map_or_else(Outcome::Failed, |()| Outcome::Written)
+                }
+                // Nobody keeps or shows here what comes about.
+                Step::Wish(Wish::Tell(_)) => Outcome::Heard,
                 Step::Wish(wish) => return Err(operations::unknown(&wish)),
             });
         }
