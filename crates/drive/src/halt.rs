@@ -120,7 +120,7 @@ impl<E: LineError> Halt<E> {
     ///
     /// [`NotHalted`]: the motor may still turn. Its `was_sent` says whether a halt went out.
     pub async fn carry_out(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), NotHalted<E>> {
-        match self.to_its_proof(line, families).await {
+        match self.until_proved(line, families).await {
             Ok(()) => Ok(()),
             Err(why) => Err(self.not_halted(line, why)),
         }
@@ -152,7 +152,7 @@ impl<E: LineError> Halt<E> {
         }
     }
 
-    async fn to_its_proof(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {
+    async fn until_proved(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {
         self.check_order()?;
         self.until_taken(line, families).await?;
         loop {
@@ -240,7 +240,7 @@ impl<E: LineError> Halt<E> {
         let wanted = self.order.nth(self.told.len());
         let came = match self.aim.take(line, families, wanted).await {
             Ok(Some(target)) => {
-                self.take_for(line, target);
+                self.take_for(line, &target);
                 self.unit.check(self.command)?;
                 self.send(line).await
             }
@@ -259,7 +259,7 @@ impl<E: LineError> Halt<E> {
     }
 
     /// From now on it is the `target`, whose command was chosen.
-    fn take_for(&mut self, line: &Mailbox<E>, target: Target) {
+    fn take_for(&mut self, line: &Mailbox<E>, target: &Target) {
         self.unit = self.named.taken_for(&target.family, &self.record, line.connection());
         self.command = target.command;
     }

@@ -33,7 +33,7 @@
 //! # After an error: did the drive take it?
 //!
 //! [`Error::may_have_acted`] says whether the request went out and may have been obeyed, and [`Error::kind`] says by whose
-//! fault it failed. Nothing that changes something in a drive is repeated here.
+//! fault it failed. Nothing that changes something in a drive is repeated here, but a [halt](Bus::halt).
 //!
 //! # Without a thread that waits
 //!

@@ -33,7 +33,7 @@ impl Plant {
         let speed = profile.role("setpoints.frequency").unwrap();
         let needs = &profile.setpoints()[&Setpoint::Frequency].needs;
         for setting in profile.control().iter().chain(needs) {
-            let place = place(&profile.find(&setting.code).unwrap());
+            let place = place(profile.find(&setting.code).unwrap());
             let _absent = self.drive().set_parameter(place.address, setting.raw);
         }
         for _ in 0..3 {
