@@ -1,6 +1,6 @@
 use std::collections::VecDeque;
 
-use drivebus_drives::{Place, State};
+use drivebus_drives::{Entry, Place, State};
 use proptest::prelude::*;
 
 use super::*;
@@ -46,7 +46,7 @@ impl Motor {
     /// The word of its status by which the bus alone commands it.
     fn by_bus(&self) -> u16 {
         let words = self.family.profile().status_words();
-        let field = words.flat_map(|word| word.bits()).find(|field| field.name() == "control_channel").unwrap();
+        let field = words.flat_map(Entry::bits).find(|field| field.name() == "control_channel").unwrap();
         (0..=u16::MAX).find(|&raw| field.meaning(raw) == "communication").unwrap()
     }
 }
@@ -180,7 +180,7 @@ impl Unit for Acknowledges {
         let profile = self.family.profile();
         let shows = if self.obeys && self.was_told { State::Stopped } else { State::Forward };
         let word = (0..=u16::MAX).find(|&raw| profile.state(raw) == shows && !profile.is_in_fault(raw)).unwrap();
-        let place = profile.role("state").and_then(|entry| entry.place()).unwrap();
+        let place = profile.role("state").and_then(Entry::place).unwrap();
         if read.place == place { Ok(word) } else { like(&self.family, &[])(read) }
     }
 
