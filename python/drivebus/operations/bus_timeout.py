@@ -146,7 +146,7 @@ class BusTimeout:
         lowest, deadline = math.inf, bus.now()
         while True:
             seen = await state.state(self._unit)
-            if seen.at_rest and not await speed.turns_in_spite_of(self._unit, seen, urgent=False):
+            if seen.at_rest and not await speed.turns_in_spite_of(self._unit, seen):
                 return True
             frequency = await speed.output_frequency(self._unit)
             now = bus.now()

@@ -119,34 +119,23 @@ async def send(
     address: int,
     value: int | Sequence[int],
     *,
-    urgent: bool = False,
-    timeout: float | None = None,
     read_back: int | None = None,
     connection: int | None = None,
     force: bool = False,
-) -> bool:
-    """Writes to whatever unit answers at the address: for a stop, which asks nothing before.
-
-    Returns:
-        Whether the drive confirmed it; False where it only said that it took it and is still at it.
-    """
+) -> None:
+    """Writes to whatever unit answers at the address. One that says that it took it and is still at it has taken it."""
     value = as_written(unit.profile, value)
     table, first = tables.split(address)
     shown_at = None if read_back is None else tables.split(read_back)[1]
-    is_confirmed = True
     try:
         with explained(unit):
-            await unit.bus.ask(
-                Write(unit.address, first, value, table, urgent, shown_at, connection, unit.halts, force, timeout)
-            )
+            await unit.bus.ask(Write(unit.address, first, value, table, False, shown_at, connection, unit.halts, force))
     except Refused as error:
         # Where the words can be read, the bus has looked whether they are there.
         if error.means != "taken":
             raise
-        is_confirmed = False
     if unit.taken is not None:
         unit.taken.writes += 1
-    return is_confirmed
 
 
 async def carried_out_of(unit: DriveView, task: _native.Task) -> Any:
