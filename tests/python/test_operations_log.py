@@ -28,6 +28,8 @@ def test_what_is_asked_otherwise_than_the_bus_asks_is_told(caplog: pytest.LogCap
         bus.drive(1, "gd350").stop()
     told = [record.message for record in caplog.records if record.name == LOGGER]
     assert told[0] == "read 2103H of unit 1, urgent, within 0.1 s, repeated 0 times at most -> [416]"
+    # INVT's command register, and its word for a stop by the ramp.
+    assert "write 0005H to 2000H of unit 1, urgent, within 0.1 s -> done" in told
 
 
 def test_who_does_not_ask_for_them_gets_none(caplog: pytest.LogCaptureFixture) -> None:

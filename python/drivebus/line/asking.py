@@ -42,11 +42,10 @@ class Read:
         return cls(unit, address, count, table, urgent, verify)
 
     def __str__(self) -> str:
-        """`read 2 from 2100H of unit 1, urgent, within 0.1 s, repeated 0 times at most`."""
+        """`read 2 from 2100H on of unit 1, urgent, within 0.1 s, repeated 0 times at most`."""
         place = tables.shown(tables.place(self.table, self.address))
         what = f"read {place}" if self.count == 1 else f"read {self.count} from {place} on"
-        how = ", urgent" * self.urgent + ", until the same came twice" * self.verify
-        how += "" if self.timeout is None else f", within {self.timeout:g} s"
+        how = _how(self) + ", until the same came twice" * self.verify
         how += "" if self.retries is None else f", repeated {self.retries} times at most"
         return f"{what} of unit {self.unit}{how}"
 
@@ -80,6 +79,19 @@ class Write:
     halts: int | None = None
     force: bool = False
     timeout: float | None = None
+
+    def __str__(self) -> str:
+        """`write 0005H to 2000H of unit 1, urgent, within 0.1 s`."""
+        words = [self.value] if isinstance(self.value, int) else self.value
+        what = " ".join(f"{word:04X}H" for word in words)
+        how = _how(self) + ", whatever the family defines" * self.force
+        return f"write {what} to {tables.shown(tables.place(self.table, self.address))} of unit {self.unit}{how}"
+
+
+def _how(request: Read | Write) -> str:
+    """How *request* is asked, where it is otherwise than its bus asks."""
+    within = "" if request.timeout is None else f", within {request.timeout:g} s"
+    return ", urgent" * request.urgent + within
 
 
 class Stamped(NamedTuple):
