@@ -12,9 +12,9 @@ import pytest
 
 import drivebus
 from drivebus import Bus, Drive, Simulator, State
-from drivebus.look import Look
+from drivebus.line.asking import Read, Stamped
+from drivebus.line.blocking import BlockingBus
 from drivebus.operations import state
-from drivebus.operations.drive_view import DriveView
 
 CONTROL, FORWARD, STOP, COAST = 0x2000, 1, 5, 6
 LOOK = 0.1  # seconds that two reads and the pause between them take at 19200, amply
@@ -145,12 +145,13 @@ def test_a_start_that_was_not_sent_is_not_stopped(virtual: Simulator, virtual_dr
 
 def test_a_state_nobody_knows_is_not_a_stop(virtual_drive: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
     virtual_drive.run(hz=5.0)
-    glance = state.glance
+    ask = BlockingBus.ask_stamped
 
-    async def nobody_knows(unit: DriveView, *, urgent: bool = False) -> Look:
-        return (await glance(unit, urgent=urgent))._replace(state=State.UNKNOWN)
+    async def nobody_knows(bus: BlockingBus, request: Read) -> Stamped:
+        came = await ask(bus, request)
+        return came._replace(words=[0x00FF, *came.words[1:]]) if request.address == 0x2100 else came
 
-    monkeypatch.setattr(state, "glance", nobody_knows)
+    monkeypatch.setattr(BlockingBus, "ask_stamped", nobody_knows)
     monkeypatch.setattr(state, "state_of", lambda *_: State.UNKNOWN)
     with pytest.raises(drivebus.Unconfirmed, match=r"stop was sent to unit 1.*unknown"):
         virtual_drive.stop()
