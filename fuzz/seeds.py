@@ -393,6 +393,26 @@ def clients() -> dict[str, bytes]:
     }
 
 
+def operations() -> dict[str, bytes]:
+    """For `operation`: who the unit is named as, the operation, its times, and what comes of each wish."""
+    # Kinds of what comes of a request: silence, damaged, refused, lost; any word, a code, a small one, what it said before.
+    silence, damaged, refused, lost, word, code, small, same = 0, 1, 2, 4, 8, 10, 11, 12
+    soon = 2 << 4
+    identify, check, stop, coast = 0, 1, 3, 4
+    return {
+        "nothing": b"",
+        **{f"stop-{family}": bytes([family, stop, 40, 20]) + bytes([soon | same]) * 200 for family in range(25)},
+        **{f"coast-{family}": bytes([family, coast, 40, 20]) + bytes([soon | small, 3] * 100) for family in range(25)},
+        "identify-code": bytes([0, identify, 0, 0, soon | code, 3]) + bytes([soon | same]) * 40,
+        "identify-refusals": bytes([0, identify, 0, 0]) + bytes([soon | refused, 2]) * 60,
+        "check-lost": bytes([1, check, 0, 0]) + bytes([soon | lost, soon | word, 1, 0xA0]) * 10,
+        "stop-busy": bytes([2, stop, 200, 40]) + bytes([soon | refused, 6]) * 80,
+        "stop-damaged": bytes([0, stop, 200, 40]) + bytes([soon | damaged, 3, 1, 3, 2]) * 40,
+        "stop-silent": bytes([0, stop, 100, 100, silence]),
+        "stop-another": bytes([0, stop, 100, 100]) + bytes([soon | code, 9, soon | small, 1]) * 60,
+    }
+
+
 def main() -> None:
     """The command."""
     listened = streams()
@@ -414,6 +434,7 @@ def main() -> None:
         "guest": guests(),
         "listener": listened,
         "master": masters(),
+        "operation": operations(),
         "profile": profiles(),
         "sniffer": listened,
         "slave": {name: b"\0" + stream for name, stream in listened.items()},

@@ -14,6 +14,7 @@ mod gateway;
 mod guest;
 mod listener;
 mod master;
+mod operation;
 mod oracle;
 mod profile;
 mod slave;
@@ -29,6 +30,7 @@ pub use gateway::gateway;
 pub use guest::guest;
 pub use listener::listener;
 pub use master::master;
+pub use operation::operation;
 pub use profile::profile;
 pub use slave::slave;
 pub use sniffer::sniffer;
@@ -37,7 +39,7 @@ pub use sniffer::sniffer;
 pub type Target = fn(&[u8]);
 
 /// Every target by the name of its corpus and of its program.
-pub const TARGETS: [(&str, Target); 11] = [
+pub const TARGETS: [(&str, Target); 12] = [
     ("frame", frame),
     ("framer", framer),
     ("listener", listener),
@@ -49,4 +51,5 @@ pub const TARGETS: [(&str, Target); 11] = [
     ("guest", guest),
     ("gateway", gateway),
     ("sniffer", sniffer),
+    ("operation", operation),
 ];

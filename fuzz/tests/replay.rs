@@ -42,7 +42,7 @@ macro_rules! replays {
     };
 }
 
-replays!(bus conversation frame framer gateway guest listener master profile slave sniffer);
+replays!(bus conversation frame framer gateway guest listener master operation profile slave sniffer);
 
 #[test]
 fn the_corpus_stays_small() {
