@@ -21,7 +21,7 @@ from drivebus import Simulator
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminal, and no signal but kill")
 
-CONTROL, FORWARD, STOP, JOG, JOG_STOP = 0x2000, 1, 5, 3, 8
+CONTROL, FORWARD, STOP, COAST, JOG, JOG_STOP = 0x2000, 1, 5, 6, 3, 8
 CE = 18  # GD350 manual, list of faults: communication fault
 KILLED_BY = {signal.SIGTERM: 143, signal.SIGHUP: 129} if os.name != "nt" else {}
 RAMP = 0.5  # seconds to 50 Hz
@@ -324,7 +324,10 @@ def test_a_child_that_c_code_forked_leaves_the_motor_to_its_parent(simulator: Si
     out, said = child.communicate(timeout=60)
     assert (child.returncode, out) == (0, "FORWARD\n"), said
     assert "drivebus" not in said.replace("RuntimeError", "")
-    assert commands(simulator) == [FORWARD, STOP]
+    # That it ran behind the child's end tells who stopped it. A drive that is slow to confirm is told again.
+    run, *halts = commands(simulator)
+    assert run == FORWARD
+    assert {STOP} <= {*halts} <= {STOP, COAST}
 
 
 @pytest.mark.parametrize("action", ["coast", "stop"])
