@@ -200,6 +200,7 @@ pub struct Gateway {
     address: Address,
     clients: Arc<Clients>,
     counts: Arc<Counts>,
+    audit: Arc<Audit>,
     is_closed: Arc<AtomicBool>,
     opened_by: Process,
     /// The thread at the door, until it is told to end.
@@ -252,6 +253,7 @@ impl Gateway {
             address,
             clients: Arc::clone(&hall.clients),
             counts: Arc::clone(&hall.common.counts),
+            audit: Arc::clone(&hall.common.audit),
             is_closed: Arc::default(),
             opened_by: Process::current(),
             door: Mutex::default(),
@@ -293,6 +295,8 @@ impl Gateway {
                 // One that panicked stands there no more either.
                 let _ = standing.join();
             }
+            // Whoever closes it reads what its clients wrote.
+            self.audit.settle(TO_END);
         }
     }
 
@@ -337,7 +341,7 @@ fn hall(bus: &Arc<Bus>, options: GatewayOptions) -> io::Result<Hall> {
             Some(DeadMan::After(silence)) => Some(silence),
             Some(DeadMan::Off) | None => None,
         },
-        audit,
+        audit: Arc::new(audit),
         counts,
         together: Arc::default(),
         wear: Wear::default(),

@@ -26,8 +26,17 @@ const WAITING: usize = 10_000;
 /// The file, until this is dropped. Without one, nothing is written.
 #[derive(Debug, Default)]
 pub(super) struct Audit {
-    lines: Mutex<Option<SyncSender<String>>>,
+    lines: Mutex<Option<SyncSender<Item>>>,
     writer: Mutex<Option<JoinHandle<()>>>,
+}
+
+/// What the thread is given.
+#[derive(Debug)]
+enum Item {
+    /// A line to write.
+    Line(String),
+    /// Whom to tell that all before this is written.
+    Settled(SyncSender<()>),
 }
 
 /// What became of a write.
@@ -65,10 +74,16 @@ impl Audit {
     pub(super) fn open(path: &Path, fails: impl Fn(String) + Send + 'static) -> io::Result<Self> {
         let mut file = Rotated::open(path)?;
         let (lines, waiting) = sync_channel(WAITING);
-        let mut write = move |waiting: Receiver<String>| {
-            for line in waiting {
-                if let Err(error) = file.append(&line) {
-                    fails(format!("the audit cannot be written: {error}; lost is {line}"));
+        let mut write = move |waiting: Receiver<Item>| {
+            for item in waiting {
+                match item {
+                    Item::Line(line) => {
+                        if let Err(error) = file.append(&line) {
+                            fails(format!("the audit cannot be written: {error}; lost is {line}"));
+                        }
+                    }
+                    // Who waited may have given up.
+                    Item::Settled(told) => drop(told.try_send(())),
                 }
             }
         };
@@ -93,11 +108,23 @@ impl Audit {
         })
     }
 
+    /// Waits until all that was told so far is written, for `time` at most.
+    pub(super) fn settle(&self, time: Duration) {
+        let (settled, told) = sync_channel(1);
+        let is_asked = {
+            let lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
+            lines.as_ref().is_some_and(|lines| lines.try_send(Item::Settled(settled)).is_ok())
+        };
+        if is_asked {
+            let _ = told.recv_timeout(time);
+        }
+    }
+
     fn append(&self, line: impl FnOnce() -> String) -> bool {
         let lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         // Where the thread panicked, nothing is written any more.
         lines.as_ref().is_none_or(|lines| {
-            !matches!(lines.try_send(line()), Err(TrySendError::Full(_) | TrySendError::Disconnected(_)))
+            !matches!(lines.try_send(Item::Line(line())), Err(TrySendError::Full(_) | TrySendError::Disconnected(_)))
         })
     }
 }
@@ -291,6 +318,18 @@ mod tests {
     impl Drop for Folder {
         fn drop(&mut self) {
             let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    #[test]
+    fn what_was_told_is_in_the_file_once_it_is_settled() {
+        let folder = Folder::new("settled");
+        let path = folder.0.join("audit.jsonl");
+        let audit = Audit::open(&path, |why| panic!("{why}")).unwrap();
+        for count in 1..=200 {
+            assert!(audit.write(&entry("P00.11"), Outcome::Done));
+            audit.settle(Duration::from_secs(60));
+            assert_eq!(fs::read_to_string(&path).unwrap().lines().count(), count);
         }
     }
 

@@ -22,7 +22,7 @@ pub(super) struct Common {
     pub(super) rights: Rights,
     /// After how long a silence of who commanded motion it is halted; `None`: never.
     pub(super) dead_man: Option<Duration>,
-    pub(super) audit: Audit,
+    pub(super) audit: Arc<Audit>,
     pub(super) counts: Arc<Counts>,
     pub(super) together: Arc<Together>,
     pub(super) wear: Wear,
