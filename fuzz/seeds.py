@@ -395,7 +395,7 @@ def clients() -> dict[str, bytes]:
 
 def operations() -> dict[str, bytes]:
     """For `operation`: who the unit is named as, the operation, its times, and what comes of each wish."""
-    # Kinds of what comes of a request: silence, damaged, refused, lost; any word, a code, a small one, what it said before.
+    # What comes of a request: silence, damaged, refused, lost; any word, a code, a small one, what it said before.
     silence, damaged, refused, lost, word, code, small, same = 0, 1, 2, 4, 8, 10, 11, 12
     soon = 2 << 4
     identify, check, stop, coast = 0, 1, 3, 4
