@@ -131,11 +131,7 @@ impl<E> Mailbox<E> {
     ///
     /// What whoever drives made of it.
     pub async fn read(&self, read: Read) -> Result<Vec<u16>, E> {
-        let words = |outcome| match outcome {
-            Outcome::Words(words) => Some(Ok(words)),
-            Outcome::Failed(error) => Some(Err(error)),
-            _ => None,
-        };
+        let words = |outcome| if let Outcome::Words(words) = outcome { Some(words) } else { None };
         self.ask(Wish::Read(Read { is_stamped: false, ..read }), words).await
     }
 
@@ -145,11 +141,7 @@ impl<E> Mailbox<E> {
     ///
     /// As [`read`](Self::read) has them.
     pub async fn read_stamped(&self, read: Read) -> Result<Stamped, E> {
-        let stamped = |outcome| match outcome {
-            Outcome::Stamped(stamped) => Some(Ok(stamped)),
-            Outcome::Failed(error) => Some(Err(error)),
-            _ => None,
-        };
+        let stamped = |outcome| if let Outcome::Stamped(stamped) = outcome { Some(stamped) } else { None };
         self.ask(Wish::Read(Read { is_stamped: true, ..read }), stamped).await
     }
 
@@ -159,12 +151,7 @@ impl<E> Mailbox<E> {
     ///
     /// As [`read`](Self::read) has them.
     pub async fn sleep(&self, time: Duration) -> Result<(), E> {
-        let slept = |outcome| match outcome {
-            Outcome::Slept => Some(Ok(())),
-            Outcome::Failed(error) => Some(Err(error)),
-            _ => None,
-        };
-        self.ask(Wish::Sleep(time), slept).await
+        self.ask(Wish::Sleep(time), |outcome| matches!(outcome, Outcome::Slept).then_some(())).await
     }
 
     /// Writes words, once.
@@ -173,20 +160,24 @@ impl<E> Mailbox<E> {
     ///
     /// As [`read`](Self::read) has them.
     pub async fn write(&self, write: Write) -> Result<(), E> {
-        let written = |outcome| match outcome {
-            Outcome::Written => Some(Ok(())),
-            Outcome::Failed(error) => Some(Err(error)),
-            _ => None,
-        };
-        self.ask(Wish::Write(write), written).await
+        self.ask(Wish::Write(write), |outcome| matches!(outcome, Outcome::Written).then_some(())).await
     }
 
     /// Tells whoever drives what has just come about.
     pub async fn tell(&self, notice: Notice) {
-        self.ask(Wish::Tell(notice), |outcome| matches!(outcome, Outcome::Heard).then_some(())).await;
+        self.wait(Wish::Tell(notice), |outcome| matches!(outcome, Outcome::Heard).then_some(())).await;
     }
 
-    async fn ask<T>(&self, wish: Wish, take: fn(Outcome<E>) -> Option<T>) -> T {
+    /// What comes of a wish that may fail.
+    async fn ask<T>(&self, wish: Wish, take: fn(Outcome<E>) -> Option<T>) -> Result<T, E> {
+        self.wait(wish, |outcome| match outcome {
+            Outcome::Failed(error) => Some(Err(error)),
+            outcome => take(outcome).map(Ok),
+        })
+        .await
+    }
+
+    async fn wait<T>(&self, wish: Wish, take: impl Fn(Outcome<E>) -> Option<T>) -> T {
         let mut wish = Some(Wished { wish, family: self.family.clone() });
         poll_fn(|_| {
             let mut desk = self.desk();
@@ -195,7 +186,7 @@ impl<E> Mailbox<E> {
                 return Poll::Pending;
             }
             // What does not fit was refused at the door of the step.
-            desk.outcome.take().and_then(take).map_or(Poll::Pending, Poll::Ready)
+            desk.outcome.take().and_then(&take).map_or(Poll::Pending, Poll::Ready)
         })
         .await
     }
@@ -279,14 +270,12 @@ impl<T, E> Task<T, E> {
     ///
     /// [`Misuse`]: the step was not made, or, as [`Misuse::Stuck`], came to nothing.
     pub fn step(&mut self, seen: Seen, outcome: Option<Outcome<E>>) -> Result<Step<T>, Misuse> {
-        if self.operation.is_none() {
-            return Err(Misuse::Over);
-        }
+        let operation = self.operation.as_mut().ok_or(Misuse::Over)?;
         let mut desk = self.mailbox.desk();
         if seen.now < desk.seen.now {
             return Err(Misuse::WentBack(desk.seen.now.saturating_duration_since(seen.now)));
         }
-        match (self.pending(), &outcome) {
+        match (self.wished.as_ref().map(|wished| &wished.wish), &outcome) {
             (None, Some(_)) => return Err(Misuse::NotWished),
             (Some(wish), None) => return Err(Misuse::NoOutcome(wish.clone())),
             (Some(wish), Some(outcome)) if !wish.is_met_by(outcome) => return Err(Misuse::Unfit(wish.clone())),
@@ -296,7 +285,6 @@ impl<T, E> Task<T, E> {
         desk.outcome = outcome;
         drop(desk);
         self.wished = None;
-        let operation = self.operation.as_mut().ok_or(Misuse::Over)?;
         if let Poll::Ready(done) = operation.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
             self.operation = None;
             return Ok(Step::Done(done));
