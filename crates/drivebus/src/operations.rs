@@ -3,7 +3,7 @@
 //! An operation is written once, in `drivebus-drive`; here it finds a line, for who waits and for who awaits.
 
 use std::sync::Arc;
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use drivebus_drive::task::{
     Cause, LineError, Misuse, Outcome, Payload as Words, Read, Seen, Stamped, Step, Task, Wish, Write,
@@ -76,10 +76,8 @@ pub(crate) fn unknown(wish: &Wish) -> Error {
 
 /// What a read of an operation wants otherwise than its bus.
 pub(crate) fn options_of(read: &Read) -> CallOptions {
-    let options = CallOptions::new();
-    let options = read.timeout.map_or(options, |timeout| options.timeout(timeout));
-    let options = read.retries.map_or(options, |retries| options.retries(retries));
-    if read.is_urgent { options.urgent() } else { options }
+    let options = options(read.timeout, read.is_urgent);
+    read.retries.map_or(options, |retries| options.retries(retries))
 }
 
 /// What a write of an operation carries.
@@ -92,12 +90,15 @@ pub(crate) fn payload_of(write: &Write) -> Payload<'_> {
 
 /// What a write of an operation wants otherwise than its bus. This bus knows no family of its units, and holds no word back.
 pub(crate) fn options_of_write(write: &Write) -> CallOptions {
-    let options = CallOptions::new();
-    let options = write.timeout.map_or(options, |timeout| options.timeout(timeout));
+    let options = options(write.timeout, write.is_urgent);
     let options = write.read_back.map_or(options, |address| options.read_back(address));
     let options = write.connection.map_or(options, |connection| options.connection(connection));
-    let options = write.halts.map_or(options, |halts| options.halts(halts));
-    if write.is_urgent { options.urgent() } else { options }
+    write.halts.map_or(options, |halts| options.halts(halts))
+}
+
+fn options(timeout: Option<Duration>, is_urgent: bool) -> CallOptions {
+    let options = timeout.map_or(CallOptions::new(), |timeout| CallOptions::new().timeout(timeout));
+    if is_urgent { options.urgent() } else { options }
 }
 
 impl Bus {
