@@ -239,7 +239,7 @@ impl<'i> Line<'i> {
         let is_taken = match &came {
             Ok(()) => true,
             Err(fault) => match fault.cause {
-                Cause::Refused(code, _) => family_means(family, code) == Meaning::Taken,
+                Cause::Refused(code, _) => family.meaning_of(code) == Meaning::Taken,
                 _ => false,
             },
         };
@@ -279,11 +279,6 @@ impl<'i> Line<'i> {
             how => Ok(how),
         }
     }
-}
-
-/// What `family` means by an exception.
-fn family_means(family: &Family, code: ExceptionCode) -> Meaning {
-    drivebus_drive::meanings(family.profile()).of(code)
 }
 
 /// What does not fit the `wish` is refused, and the task waits for the same still.

@@ -144,7 +144,7 @@ impl Family {
     }
 
     /// What its units say by the exception `code`.
-    pub(crate) fn meaning_of(&self, code: ExceptionCode) -> Meaning {
+    pub fn meaning_of(&self, code: ExceptionCode) -> Meaning {
         self.meanings.of(code)
     }
 
