@@ -36,13 +36,12 @@ const PATIENCE: std::time::Duration = std::time::Duration::from_millis(100);
 /// The system does not let one ask, or its answer is none.
 pub(super) fn listeners(port: u16) -> Result<Vec<Listener>> {
     let mut found = Vec::new();
+    let socket = socket_with(AddressFamily::NETLINK, SocketType::RAW, SocketFlags::CLOEXEC, Some(netlink::SOCK_DIAG))?;
+    set_socket_timeout(&socket, Timeout::Recv, Some(PATIENCE))?;
+    // What one answer of the system holds at most.
+    let mut answer = vec![0; 32_768];
     for family in [AddressFamily::INET, AddressFamily::INET6] {
-        let socket =
-            socket_with(AddressFamily::NETLINK, SocketType::RAW, SocketFlags::CLOEXEC, Some(netlink::SOCK_DIAG))?;
-        set_socket_timeout(&socket, Timeout::Recv, Some(PATIENCE))?;
         send(&socket, &question(family, port), SendFlags::empty())?;
-        // What one answer of the system holds at most.
-        let mut answer = vec![0; 32_768];
         loop {
             let (length, whole) = recv(&socket, answer.as_mut_slice(), RecvFlags::TRUNC)?;
             if length < whole {
