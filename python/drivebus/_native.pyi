@@ -20,6 +20,7 @@ _Writable: TypeAlias = tuple[str, int, list[int] | None, str, int | None, str, i
 __version__: Final[str]
 __all__ = [
     "FALL_PATIENCE",
+    "HALT_WITHIN",
     "STANDSTILL",
     "Asked",
     "Batch",
@@ -84,6 +85,9 @@ __all__ = [
 FALL_PATIENCE: Final[float]
 """Seconds of the line's clock in which the frequency of a motor that stops must fall: even a ramp of an hour takes off
 a hundredth of a hertz in that time."""
+
+HALT_WITHIN: Final[float]
+"""Seconds for which a halt is sent that is not taken, where nothing else is said."""
 
 STANDSTILL: Final[float]
 """Output frequency in Hz up to which a drive that has stopped counts as stopped."""
@@ -637,9 +641,9 @@ class Looks:
         That is the state, its word or None, the number of the fault or None, whether it is in that, the bit fields with
         what they mean, and the Unix time at which the first of it was asked for.
         """
-    def output_frequency(self, unit: int, urgent: bool, /) -> Task:
+    def output_frequency(self, unit: int, /) -> Task:
         """Comes to the output frequency in Hz; to None where the family does not tell."""
-    def turns_in_spite_of(self, unit: int, state: str, urgent: bool, /) -> Task:
+    def turns_in_spite_of(self, unit: int, state: str, /) -> Task:
         """Comes to whether a motor whose *state* says that it rests turns. NotAllowed: there is no such state."""
 
 @final

@@ -54,6 +54,9 @@ pub struct Order {
 }
 
 impl Order {
+    /// How long a halt is sent where nothing else is said.
+    pub const WITHIN: Duration = Duration::from_secs(10);
+
     fn nth(&self, frame: usize) -> Command {
         if self.coasts && frame % 4 == 3 { Command::Coast } else { self.command }
     }

@@ -69,7 +69,7 @@ impl Halting {
             unit: checks::unit(unit)?,
             family: Families::shipped().family(profile),
             record: Record::default(),
-            order: Order { command, coasts: false, within: Duration::from_secs(10), confirm: Duration::from_secs(1) },
+            order: Order { command, coasts: false, within: Order::WITHIN, confirm: Duration::from_secs(1) },
             is_unverified: false,
             is_trusted: false,
         })

@@ -104,6 +104,7 @@ mod _native {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("FALL_PATIENCE", drivebus_drive::Fall::PATIENCE.as_secs_f64())?;
+        module.add("HALT_WITHIN", drivebus_drive::Order::WITHIN.as_secs_f64())?;
         module.add("STANDSTILL", drivebus_drive::STANDSTILL)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

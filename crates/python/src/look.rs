@@ -66,15 +66,15 @@ impl Looks {
         ))
     }
 
-    #[pyo3(signature = (unit, urgent, /))]
-    fn output_frequency(&self, unit: &Bound<'_, PyAny>, urgent: bool) -> PyResult<Task> {
-        self.asked(unit, async move |speeds, line, unit| speeds.output(&line, unit, urgent).await)
+    #[pyo3(signature = (unit, /))]
+    fn output_frequency(&self, unit: &Bound<'_, PyAny>) -> PyResult<Task> {
+        self.asked(unit, async move |speeds, line, unit| speeds.output(&line, unit, false).await)
     }
 
-    #[pyo3(signature = (unit, state, urgent, /))]
-    fn turns_in_spite_of(&self, unit: &Bound<'_, PyAny>, state: &str, urgent: bool) -> PyResult<Task> {
+    #[pyo3(signature = (unit, state, /))]
+    fn turns_in_spite_of(&self, unit: &Bound<'_, PyAny>, state: &str) -> PyResult<Task> {
         let state = State::named(state).ok_or_else(|| bad_argument(format!("state {state:?} is none")))?;
-        self.asked(unit, async move |speeds, line, unit| speeds.turns_in_spite_of(state, &line, unit, urgent).await)
+        self.asked(unit, async move |speeds, line, unit| speeds.turns_in_spite_of(state, &line, unit, false).await)
     }
 }
 

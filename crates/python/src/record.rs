@@ -1,6 +1,6 @@
 //! `Record` for Python: what was sent to a unit, and what it said of itself.
 
-use drivebus_drive::{self as drive};
+use drivebus_drive as drive;
 use drivebus_drives::State;
 use pyo3::prelude::*;
 

@@ -17,7 +17,7 @@ from drivebus.profile import Profile
 
 __all__ = ["WITHIN", "Halt"]
 
-WITHIN = 10.0
+WITHIN = _native.HALT_WITHIN
 """Seconds for which a halt is sent that is not taken."""
 
 

@@ -11,13 +11,13 @@ __all__ = ["output_frequency", "turns_in_spite_of"]
 
 async def output_frequency(unit: DriveView) -> float | None:
     """The output frequency in Hz, whichever way the motor turns; None where the family does not tell."""
-    asked = state.planned(unit.evidence).looks.output_frequency(unit.address, False)
+    asked = state.planned(unit.evidence).looks.output_frequency(unit.address)
     told: float | None = await raw_words.carried_out_of(unit, asked)
     return told
 
 
 async def turns_in_spite_of(unit: DriveView, doing: State) -> bool:
     """Whether a motor that rests as it is *doing* still turns, in a family whose word may say so on the ramp."""
-    asked = state.planned(unit.evidence).looks.turns_in_spite_of(unit.address, doing.value, False)
+    asked = state.planned(unit.evidence).looks.turns_in_spite_of(unit.address, doing.value)
     told: bool = await raw_words.carried_out_of(unit, asked)
     return told
