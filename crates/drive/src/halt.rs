@@ -325,7 +325,10 @@ impl<E: LineError> Halt<E> {
             };
             self.was_sent |= error.was_sent();
             match error.cause() {
-                Cause::Refused(code, _) if family.meaning_of(code) == Meaning::Taken => self.is_confirmed = false,
+                // Who says that it took it got it, whatever else is known of the request.
+                Cause::Refused(code, _) if family.meaning_of(code) == Meaning::Taken => {
+                    (self.was_sent, self.is_confirmed) = (true, false);
+                }
                 _ => {
                     self.record.note(|sent| sent.halts += u64::from(error.was_sent()));
                     return Err(error);

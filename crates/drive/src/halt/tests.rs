@@ -343,6 +343,28 @@ impl Unit for Whatever {
     }
 }
 
+/// It is at it, as it says, and no line knows how that request went out; what else it says is any of `replies`.
+fn at_it(family: &str, within: u64, replies: Vec<Reply>) -> Halted {
+    let acknowledged = refuses(0x05).map_err(|fault: Fault| Fault { was_sent: false, ..fault });
+    let (confirm, within) = (Duration::from_millis(300), Duration::from_millis(within));
+    let unit = Whatever { replies, confirms: vec![acknowledged], asked: 0, sent: 0 };
+    halt(&shipped(family), Order { within, confirm, ..order(Command::Stop) }, unit)
+}
+
+#[test]
+fn what_is_acknowledged_went_out() {
+    let halted = at_it("chf100a", 0, vec![fails(Cause::NoAnswer), Ok(1), Ok(0)]);
+    assert!(!halted.script.sent.is_empty());
+    assert!(halted.done.unwrap_err().was_sent);
+}
+
+#[test]
+fn what_speaks_against_its_name_without_end_is_not_told_without_end() {
+    let mut replies = vec![fails(Cause::NoAnswer), refuses(0x0C)];
+    replies.extend([33, 384, 384, 0].map(Ok));
+    assert!(at_it("sunfar-e300", 361, replies).done.unwrap_err().was_sent);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 

@@ -32,7 +32,10 @@ impl<E: LineError> Halt<E> {
             return Ok(());
         }
         let Some(against) = self.contradiction(line, families).await? else { return Ok(()) };
-        self.aim.doubt(families);
+        // One that speaks against its name again and again is not given time again and again: it would never end.
+        if self.aim.doubt(families) {
+            self.until = line.now() + self.order.within;
+        }
         match self.once_more(line, families).await {
             Err(why) if why.is_forbidden() => {
                 Err(Why::Another { against: Some(Box::new(against)), then: Box::new(why) })
@@ -82,6 +85,7 @@ impl<E: LineError> Halt<E> {
             return Ok(false);
         }
         self.unit.same().identity().is_another();
+        self.until = line.now() + self.order.within;
         self.once_more(line, families).await?;
         Ok(true)
     }
@@ -104,9 +108,9 @@ impl<E: LineError> Halt<E> {
         }
     }
 
-    /// Sends it anew, for as long again.
+    /// Sends it anew, as long as there is time.
     async fn once_more(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {
-        (self.is_taken, self.until) = (false, line.now() + self.order.within);
+        self.is_taken = false;
         self.until_taken(line, families).await
     }
 
