@@ -9,7 +9,6 @@
 
 mod not_halted;
 mod proof;
-mod taken;
 mod vouching;
 
 use std::sync::Arc;
@@ -19,14 +18,15 @@ use drivebus_drives::Command;
 use drivebus_rtu::{Instant, Meaning};
 
 pub use not_halted::{After, LastLook, NotHalted, Tries, Why};
-pub use taken::Taken;
 
 use crate::aim::{ANSWER_WITHIN, Aim, NotTaken, Target};
 use crate::asked::NotTold;
 use crate::families::Families;
 use crate::huanyang::may_be_of;
 use crate::record::Record;
+use crate::taken::Taken;
 use crate::task::{Cause, LineError, Mailbox, Notice, Payload, Write};
+pub(crate) use proof::LONG_LOOK;
 use proof::{POLL_INTERVAL, Proof};
 
 /// Time between a frame that came to nothing at once, and the next.
@@ -35,9 +35,6 @@ const PAUSE: Duration = Duration::from_millis(40);
 /// Time in which a unit says what it is, on a line that was just opened and loses an answer. One question alone takes a
 /// second there.
 const TO_SAY: Duration = Duration::from_secs(2);
-
-const WRITE_ONE: u8 = 0x06;
-const WRITE_MANY: u8 = 0x10;
 
 /// How a unit is to be halted.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -224,8 +221,13 @@ impl<E: LineError> Halt<E> {
         line.now() >= until
     }
 
+    /// Whether the `unit` may be given `command`.
+    fn check(unit: &Taken, command: Command) -> Result<(), Why<E>> {
+        unit.rule().command(command).map_err(|why| Why::MayNot(why.to_string()))
+    }
+
     fn check_order(&self) -> Result<(), Why<E>> {
-        self.named.check(self.order.command)
+        Self::check(&self.named, self.order.command)
     }
 
     async fn until_taken(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {
@@ -244,7 +246,7 @@ impl<E: LineError> Halt<E> {
         let came = match self.aim.take(line, families, wanted).await {
             Ok(Some(target)) => {
                 self.take_for(line, &target);
-                self.unit.check(self.command)?;
+                Self::check(&self.unit, self.command)?;
                 self.send(line).await
             }
             Ok(None) | Err(NotTaken::NotTold(NotTold::Unreached { .. })) => {
@@ -276,7 +278,7 @@ impl<E: LineError> Halt<E> {
                 self.doubt_named(line, families);
                 return Ok(());
             }
-            Cause::Other => return Err(Why::Failed(error)),
+            Cause::Other | Cause::Halted => return Err(Why::Failed(error)),
             Cause::BadAnswer if may_be_of(self.unit.same().unit(), error.raw()) => self.heard = Some(line.now()),
             Cause::Port if line.is_closed() => self.until = line.now(),
             Cause::NoAnswer | Cause::BadAnswer | Cause::Port => {}
@@ -309,9 +311,7 @@ impl<E: LineError> Halt<E> {
         let profile = family.profile();
         for (place, word) in [profile.command_first(self.command), profile.command(self.command)].into_iter().flatten()
         {
-            let knows = |function| profile.functions().contains(&function);
-            let by_many = !knows(WRITE_ONE) && knows(WRITE_MANY);
-            let payload = if by_many { Payload::Words(vec![word]) } else { Payload::Word(word) };
+            let payload = Payload::Word(word).as_written(profile);
             let write = Write {
                 is_urgent: true,
                 // The line knows the unit by its name, and would hold the words of another family back.
@@ -351,9 +351,9 @@ impl<E: LineError> Halt<E> {
             return Why::NotSent(last);
         }
         let tries = Tries { told: self.told.clone(), took: since(self.began), heard: self.heard.map(since) };
-        let after = match self.unit.look(line).await {
+        let after = match self.unit.look(line, true).await {
             Ok(look) => After::Seen(look),
-            Err(error) if matches!(error.cause(), Cause::Other) => return Why::Failed(error),
+            Err(error) if matches!(error.cause(), Cause::Other | Cause::Halted) => return Why::Failed(error),
             Err(error) => After::Unread(error),
         };
         if is_refused { Why::Refused { last, tries, after } } else { Why::Unanswered { last, tries, after } }

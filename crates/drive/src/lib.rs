@@ -58,6 +58,13 @@
 //! | `halt` | a halt: sent until the unit takes it, and proved |
 //! | `look` | what the status words of a drive say |
 //! | `speed` | how fast a motor turns, and how its drive slows it down |
+//! | `taken`, `unit` | a unit as the family that it is taken for, and as one call sees it |
+//! | `settled` | what a parameter of the drive decides of the meaning of its words |
+//! | `settings` | whether the drive is set to obey the bus |
+//! | `writing` | one write to a unit that still is what it was |
+//! | `setpoint` | the frequency that a drive is to run at |
+//! | `ready` | what is looked at before a motor is started |
+//! | `command` | starts and resets: checked, sent once, and proved |
 //! | `task` | operations that wait for a line, and how they are driven without one |
 
 #![forbid(unsafe_code)]
@@ -67,6 +74,7 @@ mod answer;
 mod apart;
 mod asked;
 mod codes;
+mod command;
 mod contradiction;
 mod fall;
 mod families;
@@ -77,33 +85,48 @@ mod harm;
 pub mod huanyang;
 mod identify;
 mod look;
+mod ready;
 mod record;
 mod rule;
 mod same_unit;
 #[cfg(test)]
 mod scripted;
+mod setpoint;
+mod settings;
+mod settled;
 mod signatures;
 mod speed;
+mod taken;
 pub mod task;
+mod unit;
+mod writing;
 
 pub use aim::{ANSWER_WITHIN, Aim, NotTaken, Target, check_harmless, goes_out_at_once};
 pub use answer::{Answer, Said, meanings};
 pub use apart::{Apart, Verdict};
 pub use asked::{NotTold, answer_at, answer_once};
 pub use codes::Codes;
+pub use command::{NotCommanded, NotLedUp, Start, WhyNotCommanded, WhyNotLedUp};
 pub use contradiction::Contradiction;
 pub use fall::{Fall, Glimpse};
 pub use families::Families;
 pub use family::{Family, HALTS};
 pub use guard::Forbidden;
-pub use halt::{After, Halt, LastLook, NotHalted, Order, Taken, Tries, Why};
+pub use halt::{After, Halt, LastLook, NotHalted, Order, Tries, Why};
 pub use harm::What;
 pub use identify::{Certainty, Identification, Reason, identify};
 pub use look::{Look, Looks};
+pub use ready::{Ignores, NotReady};
 pub use record::{Record, Sent};
 pub use rule::{Rule, WhyNot};
 pub use same_unit::{Identity, NotSame, SameUnit, Told};
+pub use setpoint::NotSet;
+pub use settings::Setting;
+pub use settled::NotSettled;
 pub use speed::{Frequencies, Ramp, STANDSTILL, Speeds};
+pub use taken::Taken;
+pub use unit::Unit;
+pub use writing::{NotWritten, Words};
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

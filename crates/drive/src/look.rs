@@ -76,6 +76,29 @@ impl Look {
     }
 }
 
+/// Where a drive may take its commands from besides the bus, as the bits of a status word say it.
+const OTHER_SOURCES: [&str; 2] = ["keypad", "terminal"];
+
+/// And how they say that it is the bus.
+const BUS: &str = "communication";
+
+impl Look {
+    /// Where else than from the bus the drive takes its commands, if it says so: `keypad` or `terminal`.
+    pub fn other_source(&self) -> Option<&str> {
+        self.field("control_channel").filter(|source| OTHER_SOURCES.contains(source))
+    }
+
+    /// Whether the drive says where it takes its commands from.
+    pub(crate) fn tells_source(&self) -> bool {
+        self.other_source().is_some() || self.field("control_channel") == Some(BUS)
+    }
+
+    /// Whether it shows the number of a fault.
+    pub(crate) fn has_fault(&self) -> bool {
+        self.fault.is_some_and(|number| number != 0)
+    }
+}
+
 impl fmt::Display for Look {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.word {
@@ -155,6 +178,11 @@ impl Looks {
     /// Those of [`Rule::fault`].
     pub fn fault(&self) -> Result<(), WhyNot<'_>> {
         self.rule().fault()
+    }
+
+    /// Whether what no document of the family prints is trusted.
+    pub(crate) fn is_trusted(&self) -> bool {
+        self.is_trusted
     }
 
     /// What may be asked of its units, under the same trust.

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use crate::families::Families;
 use crate::family::Family;
-use crate::task::{Cause, LineError, Mailbox, Notice, Outcome, Read, Seen, Stamped, Step, Task, Wish, Write};
+use crate::task::{Cause, LineError, Link, Mailbox, Notice, Outcome, Read, Seen, Stamped, Step, Task, Wish, Write};
 
 /// Who is asked.
 pub(crate) const UNIT: UnitAddress = UnitAddress::by_name(5);
@@ -102,12 +102,15 @@ pub(crate) struct Script {
     /// What was written, and when.
     pub(crate) sent: Vec<(Instant, Write)>,
     pub(crate) told: Vec<Notice>,
+    pub(crate) link: Link,
+    /// How often the unit was told to halt.
+    pub(crate) halts: u64,
 }
 
 impl Script {
     pub(crate) fn new() -> Self {
         let (asked, sent, told) = (Vec::new(), Vec::new(), Vec::new());
-        Self { now: Instant::ZERO, connection: 0, is_closed: false, asked, sent, told }
+        Self { now: Instant::ZERO, connection: 0, is_closed: false, asked, sent, told, link: Link::default(), halts: 0 }
     }
 
     /// What the operation comes to where `unit` is asked, for each word of a read. Each request takes a millisecond; none is
@@ -163,6 +166,8 @@ impl Script {
                     self.now = self.now + time;
                     Some(Outcome::Slept)
                 }
+                Step::Wish(Wish::Link(_)) => Some(Outcome::Link(self.link)),
+                Step::Wish(Wish::Halts(_)) => Some(Outcome::Halts(Some(self.halts))),
                 Step::Wish(Wish::Tell(notice)) => {
                     self.told.push(notice);
                     Some(Outcome::Heard)

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use drivebus_drives::{Control, Entry, Profile, ReadPlan, Setpoint, State};
+use drivebus_drives::{Entry, Profile, ReadPlan, Setpoint, State};
 use drivebus_rtu::UnitAddress;
 
 use crate::rule::Rule;
+use crate::settings::wanted_for;
 use crate::task::{Cause, LineError, Mailbox, Read};
 
 /// Output frequency in Hz up to which a drive that has stopped counts as stopped.
@@ -67,7 +68,7 @@ impl Speeds {
             setpoint.filter(|other| frequency.is_some_and(|one| one.quantity().unit() == other.quantity().unit()));
         let both = frequency.map(|frequency| std::iter::once(frequency).chain(setpoint).collect::<Vec<_>>());
 
-        let settings = settings_of(profile);
+        let settings = wanted_for(profile, Setpoint::Frequency);
         let set = settings.iter().filter_map(|each| Some((profile.find(&each.code).ok()?, Told::Setting(each.raw))));
         let ramp = [("deceleration", Told::Time), ("ramp_start", Told::Start)];
         let ramp = ramp.into_iter().filter_map(|(role, told)| Some((profile.role(role)?, told)));
@@ -156,13 +157,6 @@ impl Speeds {
             only_by_bus: self.settings > 0 && set == self.settings,
         })
     }
-}
-
-/// What must be set so that only the bus commands the drive and gives its speed.
-fn settings_of(profile: &Profile) -> Vec<&Control> {
-    let needs = profile.setpoints().get(&Setpoint::Frequency).map_or(&[][..], |role| role.needs.as_slice());
-    let of_speed = |setting: &&Control| needs.iter().any(|need| need.code == setting.code);
-    profile.control().iter().filter(|setting| !of_speed(setting)).chain(needs).collect()
 }
 
 /// The values of `plan`, each with the counts that it is.

@@ -14,11 +14,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
-use drivebus_rtu::Instant;
+use drivebus_rtu::{Instant, UnitAddress};
 use thiserror::Error;
 
 pub use line_error::{Cause, LineError};
-pub use wish::{Notice, Payload, Read, Stamped, Wish, Write};
+pub(crate) use wish::WRITE_MANY;
+pub use wish::{Link, Notice, Payload, Read, Stamped, Wish, Write};
 
 use crate::family::Family;
 
@@ -45,6 +46,10 @@ pub enum Outcome<E> {
     Written,
     /// The time is over.
     Slept,
+    /// How well the unit could be reached.
+    Link(Link),
+    /// How often the unit was told to halt; `None` where the line does not count that.
+    Halts(Option<u64>),
     /// Whoever drives has heard it.
     Heard,
     /// It failed.
@@ -161,6 +166,25 @@ impl<E> Mailbox<E> {
     /// As [`read`](Self::read) has them.
     pub async fn write(&self, write: Write) -> Result<(), E> {
         self.ask(Wish::Write(write), |outcome| matches!(outcome, Outcome::Written).then_some(())).await
+    }
+
+    /// How well `unit` could be reached lately.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`](Self::read) has them.
+    pub async fn link(&self, unit: UnitAddress) -> Result<Link, E> {
+        self.ask(Wish::Link(unit), |outcome| if let Outcome::Link(link) = outcome { Some(link) } else { None }).await
+    }
+
+    /// How often `unit` was told to halt over this line; `None` where that is not counted.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`](Self::read) has them.
+    pub async fn halts(&self, unit: UnitAddress) -> Result<Option<u64>, E> {
+        self.ask(Wish::Halts(unit), |outcome| if let Outcome::Halts(halts) = outcome { Some(halts) } else { None })
+            .await
     }
 
     /// Tells whoever drives what has just come about.

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use drivebus_drive::task::{
-    Cause, LineError, Misuse, Outcome, Payload as Words, Read, Seen, Stamped, Step, Task, Wish, Write,
+    Cause, LineError, Link, Misuse, Outcome, Payload as Words, Read, Seen, Stamped, Step, Task, Wish, Write,
 };
 use drivebus_drive::{self as drive, Families, Identification, Look, Looks, NotTold};
-use drivebus_line::{Done, ErrorKind};
-use drivebus_rtu::{Answer, ExceptionCode, Instant};
+use drivebus_line::{Done, ErrorKind, Failure};
+use drivebus_rtu::{Answer, ExceptionCode, Instant, UnitAddress};
 
 use crate::bus::Bus;
 use crate::checks;
@@ -26,6 +26,7 @@ impl LineError for Error {
             ErrorKind::NoAnswer => Cause::NoAnswer,
             ErrorKind::BadAnswer | ErrorKind::Crc => Cause::BadAnswer,
             ErrorKind::Port => Cause::Port,
+            _ if self.call().is_some_and(|call| matches!(call.failure, Failure::Halted { .. })) => Cause::Halted,
             _ => self.code().map(ExceptionCode).map_or(Cause::Other, |code| Cause::Refused(code, code.meaning())),
         }
     }
@@ -205,6 +206,8 @@ impl Bus {
                     let came = self.write_with(write.unit.get(), write.place, payload_of(&write), options);
                     came.map_or_else(Outcome::Failed, |()| Outcome::Written)
                 }
+                Step::Wish(Wish::Link(unit)) => Outcome::Link(self.link_of(unit)),
+                Step::Wish(Wish::Halts(unit)) => Outcome::Halts(Some(self.core.halts(unit))),
                 // Nobody keeps or shows here what comes about.
                 Step::Wish(Wish::Tell(_)) => Outcome::Heard,
                 Step::Wish(wish) => return Err(unknown(&wish)),
@@ -227,6 +230,12 @@ impl Bus {
         let here = self.now();
         let at = |moment| now.saturating_sub(here.saturating_duration_since(moment));
         Outcome::Stamped(Stamped { words, asked: at(done.sent), answered: at(done.ended) })
+    }
+
+    /// How well `unit` could be reached, as operations look at it.
+    pub(crate) fn link_of(&self, unit: UnitAddress) -> Link {
+        let known = self.core.link(unit);
+        Link { good: known.good, asked: known.asked }
     }
 
     fn came_of(&self, read: &Read) -> Result<Outcome<Error>, Error> {

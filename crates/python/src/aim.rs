@@ -27,7 +27,7 @@ pub(crate) fn check_harmless(unit: &SameUnit, what: &Bound<'_, PyAny>) -> PyResu
     Ok(Task::of(|line| async move { drive::check_harmless(&line, Families::shipped(), &unit, what).await }, told))
 }
 
-fn not_taken(py: Python<'_>, error: NotTaken<Failed>) -> PyResult<Py<PyAny>> {
+pub(crate) fn not_taken(py: Python<'_>, error: NotTaken<Failed>) -> PyResult<Py<PyAny>> {
     match error {
         NotTaken::NotTold(error) => not_told(py, error),
         NotTaken::MayBe(families) => Ok(("may_be", names(&families)).into_pyobject(py)?.into_any().unbind()),

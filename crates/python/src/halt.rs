@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use drivebus_drive::task::Mailbox;
-use drivebus_drive::{self as drive, After, Families, LastLook, NotHalted, Order, Tries, Why};
+use drivebus_drive::{self as drive, Families, NotHalted, Order, Tries, Why};
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -14,7 +14,7 @@ use crate::family::{against, names};
 use crate::look::Looks;
 use crate::record::Record;
 use crate::same_unit::SameUnit;
-use crate::shown_look::shown;
+use crate::shown_look::{after as after_of, last_look};
 use crate::task::{Failed, Task, unknown};
 
 type Core = drive::Halt<Failed>;
@@ -117,10 +117,10 @@ fn told_of(py: Python<'_>, why: Why<Failed>) -> PyResult<(&'static str, Py<PyAny
         Why::Unsaid => ("unsaid", py.None()),
         Why::NotSent(error) => ("not_sent", raised(error).into_py_any(py)?),
         Why::Refused { last, tries, after } => {
-            ("refused", (raised(last), sent(tries), seen(py, after)?).into_py_any(py)?)
+            ("refused", (raised(last), sent(tries), after_of(py, after)?).into_py_any(py)?)
         }
         Why::Unanswered { last, tries, after } => {
-            ("unanswered", (raised(last), sent(tries), seen(py, after)?).into_py_any(py)?)
+            ("unanswered", (raised(last), sent(tries), after_of(py, after)?).into_py_any(py)?)
         }
         Why::Unasked(error) => ("unasked", raised(error).into_py_any(py)?),
         Why::Another { against: found, then } => {
@@ -128,8 +128,7 @@ fn told_of(py: Python<'_>, why: Why<Failed>) -> PyResult<(&'static str, Py<PyAny
             ("another", (found, told_of(py, *then)?).into_py_any(py)?)
         }
         Why::PortLost(error) => ("port_lost", raised(error).into_py_any(py)?),
-        Why::Unshown(LastLook::Seen { look, hz }) => ("unshown", (shown(look), hz).into_py_any(py)?),
-        Why::Unshown(LastLook::Unread(error)) => ("unread", raised(error).into_py_any(py)?),
+        Why::Unshown(last) => last_look(py, last)?,
         Why::Failed(error) => ("failed", raised(error).into_py_any(py)?),
         why => return Err(unknown(&why)),
     })
@@ -140,12 +139,4 @@ fn sent(tries: Tries) -> (Vec<&'static str>, f64, Option<f64>) {
     let Tries { told, took, heard } = tries;
     let told = told.into_iter().map(drivebus_drives::Command::name).collect();
     (told, took.as_secs_f64(), heard.map(|ago| ago.as_secs_f64()))
-}
-
-/// A look, or the exception instead of one.
-fn seen(py: Python<'_>, after: After<Failed>) -> PyResult<Py<PyAny>> {
-    match after {
-        After::Seen(look) => shown(look).into_py_any(py),
-        After::Unread(error) => PyErr::from(error).into_value(py).into_py_any(py),
-    }
 }

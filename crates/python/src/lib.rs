@@ -22,6 +22,7 @@ mod halt;
 mod identify;
 mod look;
 mod mailbox;
+mod not_done;
 mod open;
 mod overhear;
 mod plan;
@@ -41,6 +42,7 @@ mod sniffer;
 mod tables;
 mod task;
 mod trace;
+mod unit;
 
 /// But for `ending`, nothing here keeps state outside its objects, and each of those locks for itself: safe without the GIL.
 #[pymodule(gil_used = false)]
@@ -100,6 +102,8 @@ mod _native {
     use crate::sniffer::Sniffer;
     #[pymodule_export]
     use crate::task::Task;
+    #[pymodule_export]
+    use crate::unit::Unit;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

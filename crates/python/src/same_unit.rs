@@ -64,7 +64,7 @@ impl SameUnit {
     }
 }
 
-fn checked(py: Python<'_>, done: Result<u64, NotSame<Failed>>) -> PyResult<Py<PyAny>> {
+pub(crate) fn checked(py: Python<'_>, done: Result<u64, NotSame<Failed>>) -> PyResult<Py<PyAny>> {
     let told = match done {
         Ok(connection) => ("same", connection).into_pyobject(py)?,
         Err(NotSame::Failed(error)) => return Err(error.into()),

@@ -5,7 +5,8 @@ use std::sync::{Mutex, MutexGuard, TryLockError};
 use std::time::Duration;
 
 use drivebus_drive::task::{
-    Cause, LineError, Mailbox, Misuse, Notice, Outcome, Payload, Read, Seen, Stamped, Step, Task as Driven, Wish, Write,
+    Cause, LineError, Link, Mailbox, Misuse, Notice, Outcome, Payload, Read, Seen, Stamped, Step, Task as Driven, Wish,
+    Write,
 };
 use drivebus_rtu::{ExceptionCode, Instant, Meaning};
 use pyo3::IntoPyObjectExt;
@@ -15,6 +16,9 @@ use pyo3::prelude::*;
 use crate::clock::moment;
 use crate::errors::Class;
 use crate::shown_look::shown;
+
+/// The `why` of a bus that did not send what was decided on before a halt.
+const HALTED: &str = "halted";
 
 /// An error of a bus: the exception itself, and what operations look at of it.
 #[derive(Debug)]
@@ -40,6 +44,8 @@ impl Failed {
             Cause::NoAnswer
         } else if is(Class::BadAnswer)? {
             Cause::BadAnswer
+        } else if is(Class::NotReady)? && error.getattr("why")?.extract::<String>()? == HALTED {
+            Cause::Halted
         } else {
             Cause::Other
         };
@@ -120,7 +126,13 @@ impl Task {
             (None, Some(Wish::Tell(_))) => Some(Outcome::Heard),
             (None, _) => None,
             (Some(given), Some(Wish::Read(read))) => Some(outcome_of(given, read)?),
-            (Some(given), _) => Some(Outcome::Failed(Failed::of(given)?)),
+            (Some(given), Some(Wish::Link(_))) => Some(
+                given.extract().map(|(good, asked)| Outcome::Link(Link { good, asked })).or_else(|_| failed(given))?,
+            ),
+            (Some(given), Some(Wish::Halts(_))) => {
+                Some(given.extract().map(|(halts,)| Outcome::Halts(halts)).or_else(|_| failed(given))?)
+            }
+            (Some(given), _) => Some(failed(given)?),
         };
         // Of a line that has no clock any more the time stands still.
         *latest = (*latest).max(moment(now));
@@ -130,6 +142,10 @@ impl Task {
             Step::Wish(Wish::Sleep(time)) => Ok(("sleep", time.as_secs_f64().into_pyobject(py)?.into_any())),
             Step::Wish(Wish::Read(read)) => Ok((if read.is_stamped { "stamped" } else { "read" }, told_of(py, read)?)),
             Step::Wish(Wish::Write(write)) => Ok(("write", written_of(py, write)?)),
+            Step::Wish(Wish::Link(unit)) => Ok(("link", unit.get().into_bound_py_any(py)?)),
+            Step::Wish(Wish::Halts(unit)) => Ok(("halts", unit.get().into_bound_py_any(py)?)),
+            Step::Wish(Wish::Tell(Notice::Shows(state))) => Ok(("shows", state.name().into_bound_py_any(py)?)),
+            Step::Wish(Wish::Tell(Notice::Starts(command))) => Ok(("starts", command.name().into_bound_py_any(py)?)),
             Step::Wish(Wish::Tell(Notice::Took(command))) => Ok(("took", command.name().into_bound_py_any(py)?)),
             Step::Wish(Wish::Tell(Notice::Saw(look))) => Ok(("saw", shown(look).into_bound_py_any(py)?)),
             Step::Wish(wish) => Err(unknown(&wish)),
@@ -166,7 +182,11 @@ fn outcome_of(given: &Bound<'_, PyAny>, read: &Read) -> PyResult<Outcome<Failed>
     } else {
         given.extract().map(Outcome::Words)
     };
-    came.or_else(|_| Failed::of(given).map(Outcome::Failed))
+    came.or_else(|_| failed(given))
+}
+
+fn failed(given: &Bound<'_, PyAny>) -> PyResult<Outcome<Failed>> {
+    Failed::of(given).map(Outcome::Failed)
 }
 
 /// Unix time; a clock before that has none.

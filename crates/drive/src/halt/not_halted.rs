@@ -139,7 +139,7 @@ impl<E: LineError> Why<E> {
     pub(super) fn is_forbidden(&self) -> bool {
         match self {
             Self::MayNot(_) | Self::Undecided { .. } => true,
-            Self::Failed(error) => matches!(error.cause(), Cause::Other),
+            Self::Failed(error) => matches!(error.cause(), Cause::Other | Cause::Halted),
             _ => false,
         }
     }

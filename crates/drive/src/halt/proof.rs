@@ -6,11 +6,11 @@ use drivebus_drives::{Command, State};
 use drivebus_rtu::Instant;
 
 use super::not_halted::{LastLook, Why};
-use super::taken::Taken;
 use crate::fall::{Fall, Glimpse};
 use crate::look::Look;
 use crate::record::Record;
 use crate::speed::Ramp;
+use crate::taken::Taken;
 use crate::task::{Cause, LineError, Mailbox};
 
 /// Time between two looks at the state.
@@ -20,10 +20,7 @@ pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(20);
 const LONGER_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Time that a look takes only where it waits until nothing that is late can be mistaken.
-const LONG_LOOK: Duration = Duration::from_millis(500);
-
-/// Where a drive may take its commands from besides the bus, as the bits of a status word say it.
-const OTHER_SOURCES: [&str; 2] = ["keypad", "terminal"];
+pub(crate) const LONG_LOOK: Duration = Duration::from_millis(500);
 
 /// What is seen of one unit that took a halt.
 #[derive(Debug)]
@@ -94,7 +91,7 @@ impl Proof {
             Err(error) => match error.cause() {
                 Cause::NoAnswer | Cause::BadAnswer | Cause::Refused(..) => (LastLook::Unread(error), line.now()),
                 Cause::Port => return Err(Why::PortLost(error)),
-                Cause::Other => return Err(Why::Failed(error)),
+                Cause::Other | Cause::Halted => return Err(Why::Failed(error)),
             },
         };
         if looked_at < self.fall.until() { Ok(false) } else { Err(Why::Unshown(last)) }
@@ -102,7 +99,7 @@ impl Proof {
 
     /// What is seen now, and whether that proves it.
     async fn see<E: LineError>(&mut self, line: &Mailbox<E>, unit: &Taken, record: &Record) -> Result<(Look, bool), E> {
-        let look = unit.look(line).await?;
+        let look = unit.look(line, true).await?;
         let is_shown = self.is_shown_by(&look, line, unit, record).await?;
         Ok((look, is_shown))
     }
@@ -128,7 +125,7 @@ impl Proof {
         let Some(frequencies) = speeds.frequencies(line, address, true).await? else { return Ok(false) };
         let setpoint = frequencies.setpoint.unwrap_or(f64::INFINITY);
         self.fall.see(Glimpse { asked, answered: line.now(), hz: frequencies.output, setpoint });
-        self.by_ramp &= is_by_bus(look) && turns_as_started(record, look.state);
+        self.by_ramp &= look.other_source().is_none() && turns_as_started(record, look.state);
         if self.ramp.is_none() && self.fall.is_worth_asking() {
             self.ramp = Some(speeds.ramp(line, address, true).await?);
             // One that is slow to say nothing of it has still been falling meanwhile.
@@ -137,10 +134,6 @@ impl Proof {
         let Some(Ramp { slope: Some(slope), only_by_bus }) = self.ramp else { return Ok(false) };
         Ok(self.fall.goes_along(slope) && only_by_bus && self.by_ramp)
     }
-}
-
-fn is_by_bus(look: &Look) -> bool {
-    !look.field("control_channel").is_some_and(|source| OTHER_SOURCES.contains(&source))
 }
 
 /// Whether it turns as it was started here last, if it was: not the other way still, nor maybe in a jog.

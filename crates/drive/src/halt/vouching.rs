@@ -75,7 +75,9 @@ impl<E: LineError> Halt<E> {
             if let Err(error) = failed {
                 return match error.cause() {
                     Cause::Port => Ok(false),
-                    Cause::Other => Err(Why::Another { against: None, then: Box::new(Why::Failed(error)) }),
+                    Cause::Other | Cause::Halted => {
+                        Err(Why::Another { against: None, then: Box::new(Why::Failed(error)) })
+                    }
                     _ => Err(Why::Failed(error)),
                 };
             }

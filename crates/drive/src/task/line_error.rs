@@ -26,6 +26,8 @@ pub enum Cause {
     Refused(ExceptionCode, Meaning),
     /// The port was lost, or is closed.
     Port,
+    /// The unit was told to halt since this was decided on, or the port changed hands: nothing was sent.
+    Halted,
     /// It was not done, for a reason that says nothing of the unit.
     Other,
 }
@@ -34,6 +36,11 @@ impl Cause {
     /// Whether no answer came that counts, while the port stayed: silence, or bytes that are none.
     pub const fn is_no_answer(self) -> bool {
         matches!(self, Self::NoAnswer | Self::BadAnswer)
+    }
+
+    /// Whether the unit refused.
+    pub const fn is_refusal(self) -> bool {
+        matches!(self, Self::Refused(..))
     }
 
     /// Whether the line failed: the unit did not say anything that counts.

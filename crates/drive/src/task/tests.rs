@@ -3,7 +3,7 @@ use super::*;
 const UNIT: u8 = 5;
 
 fn read() -> Read {
-    Read::word(drivebus_rtu::UnitAddress::by_name(UNIT), 0x2100.into())
+    Read::word(UnitAddress::by_name(UNIT), 0x2100.into())
 }
 
 fn at(nanos: u64) -> Seen {

@@ -3,11 +3,16 @@
 use std::fmt;
 use std::time::Duration;
 
-use drivebus_drives::{Command, Place};
+use drivebus_drives::{Command, Place, Profile, State};
 use drivebus_rtu::UnitAddress;
 
 use super::Outcome;
 use crate::look::Look;
+
+const WRITE_ONE: u8 = 0x06;
+
+/// By which function several words are written.
+pub(crate) const WRITE_MANY: u8 = 0x10;
 
 /// What an operation wants done before it goes on.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,6 +24,10 @@ pub enum Wish {
     Write(Write),
     /// Time, on the line's clock.
     Sleep(Duration),
+    /// How well this unit could be reached lately.
+    Link(UnitAddress),
+    /// How often this unit was told to halt over this line.
+    Halts(UnitAddress),
     /// That whoever drives hears this now, and goes on.
     Tell(Notice),
 }
@@ -29,7 +38,11 @@ impl Wish {
         match (self, outcome) {
             // Who is told something has nothing to say to it.
             (Self::Tell(_), outcome) => matches!(outcome, Outcome::Heard),
-            (_, Outcome::Failed(_)) | (Self::Sleep(_), Outcome::Slept) | (Self::Write(_), Outcome::Written) => true,
+            (_, Outcome::Failed(_))
+            | (Self::Sleep(_), Outcome::Slept)
+            | (Self::Write(_), Outcome::Written)
+            | (Self::Link(_), Outcome::Link(_))
+            | (Self::Halts(_), Outcome::Halts(_)) => true,
             (Self::Read(read), Outcome::Words(words)) => !read.is_stamped && read.takes(words),
             (Self::Read(read), Outcome::Stamped(stamped)) => read.is_stamped && read.takes(&stamped.words),
             _ => false,
@@ -43,8 +56,12 @@ impl fmt::Display for Wish {
             Self::Read(read) => read.fmt(f),
             Self::Write(write) => write.fmt(f),
             Self::Sleep(time) => write!(f, "{time:?} of the line's clock"),
+            Self::Link(unit) => write!(f, "the link to unit {}", unit.get()),
+            Self::Halts(unit) => write!(f, "the number of halts of unit {}", unit.get()),
             Self::Tell(Notice::Took(command)) => write!(f, "to tell that {} was taken", command.name()),
             Self::Tell(Notice::Saw(look)) => write!(f, "to tell that a look showed {look}"),
+            Self::Tell(Notice::Shows(state)) => write!(f, "to tell that the state is {}", state.name()),
+            Self::Tell(Notice::Starts(command)) => write!(f, "to tell that {} is about to be sent", command.name()),
         }
     }
 }
@@ -152,6 +169,18 @@ pub enum Payload {
     Words(Vec<u16>),
 }
 
+impl Payload {
+    /// The same as a request to a drive of `profile` carries it: one that knows no 06H gets a single word by 10H.
+    #[must_use]
+    pub fn as_written(self, profile: &Profile) -> Self {
+        let knows = |function| profile.functions().contains(&function);
+        match self {
+            Self::Word(word) if !knows(WRITE_ONE) && knows(WRITE_MANY) => Self::Words(vec![word]),
+            payload => payload,
+        }
+    }
+}
+
 impl Write {
     /// A write to `unit` at `place`, as the line writes.
     pub const fn new(unit: UnitAddress, place: Place, payload: Payload) -> Self {
@@ -187,4 +216,30 @@ pub enum Notice {
     Took(Command),
     /// A look showed this.
     Saw(Look),
+    /// The state word alone showed this.
+    Shows(State),
+    /// This start is about to be sent: what ends it must be able to, from now on.
+    Starts(Command),
+}
+
+/// How well a unit could be reached: its last exchanges, ten at most. A refusal is an answer, too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Link {
+    /// How many of them brought an answer.
+    pub good: u32,
+    /// How many there were.
+    pub asked: u32,
+}
+
+impl Link {
+    /// How many of them brought no answer, or a damaged one.
+    pub const fn failed(self) -> u32 {
+        self.asked.saturating_sub(self.good)
+    }
+}
+
+impl fmt::Display for Link {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} of the last {} exchanges brought an answer", self.good, self.asked)
+    }
 }

@@ -8,7 +8,7 @@ use drivebus_drive::task::{Outcome, Read, Step, Task, Wish};
 use drivebus_drive::{Identification, Look, Looks};
 use drivebus_drives::Place;
 use drivebus_line::{CallOptions as LineOptions, Reply, Stats};
-use drivebus_rtu::{Destination, Instant, Request};
+use drivebus_rtu::{Destination, Instant, Request, UnitAddress};
 
 use super::asked::Asked;
 use super::poll::Poll;
@@ -175,11 +175,19 @@ impl Bus {
                         self.write_with(write.unit.get(), write.place, operations::payload_of(&write), options);
                     written.await.map_or_else(Outcome::Failed, |()| Outcome::Written)
                 }
+                Step::Wish(Wish::Link(unit)) => Outcome::Link(self.0.link_of(unit)),
+                Step::Wish(Wish::Halts(unit)) => Outcome::Halts(Some(self.halts_of(unit).await?)),
                 // Nobody keeps or shows here what comes about.
                 Step::Wish(Wish::Tell(_)) => Outcome::Heard,
                 Step::Wish(wish) => return Err(operations::unknown(&wish)),
             });
         }
+    }
+
+    /// Where another program has the port, it is asked.
+    fn halts_of(&self, unit: UnitAddress) -> Asked<u64> {
+        let bus = self.0.clone();
+        Asked::apart(move |_| Ok(bus.core.halts(unit)))
     }
 
     fn came_of(&self, read: Read) -> Asked<Outcome<Error>> {

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use drivebus_drives::Command;
+use drivebus_drives::Profile;
 
-use super::not_halted::Why;
 use crate::family::Family;
 use crate::look::{Look, Looks};
 use crate::record::Record;
+use crate::rule::Rule;
 use crate::same_unit::SameUnit;
 use crate::speed::Speeds;
 use crate::task::{Mailbox, Notice};
@@ -33,7 +33,7 @@ impl Taken {
     }
 
     /// The unit as one of `family`. Of another one than it was named as, all that is known is trusted: nothing else halts it.
-    pub(super) fn taken_for(&self, family: &Arc<Family>, record: &Record, connection: u64) -> Self {
+    pub(crate) fn taken_for(&self, family: &Arc<Family>, record: &Record, connection: u64) -> Self {
         if Arc::ptr_eq(family, self.same.family()) {
             return self.clone();
         }
@@ -45,29 +45,41 @@ impl Taken {
         }
     }
 
-    /// Whether it may be given `command`.
-    pub(super) fn check<E>(&self, command: Command) -> Result<(), Why<E>> {
-        self.looks.rule().command(command).map_err(|why| Why::MayNot(why.to_string()))
+    /// The same, whose words are known better: by `profile`.
+    pub(crate) fn with_profile(&self, profile: &Arc<Profile>) -> Self {
+        let is_trusted = self.looks.is_trusted();
+        let looks = Arc::new(Looks::new(profile, is_trusted));
+        Self { same: self.same.clone(), looks, speeds: Arc::new(Speeds::new(profile, is_trusted)) }
+    }
+
+    /// What its words mean.
+    pub(crate) fn profile(&self) -> &Arc<Profile> {
+        self.looks.profile()
+    }
+
+    /// What may be asked of it.
+    pub(crate) fn rule(&self) -> Rule<'_> {
+        self.looks.rule()
     }
 
     /// Whether the states of its family may be used.
-    pub(super) fn tells_its_state(&self) -> bool {
+    pub(crate) fn tells_its_state(&self) -> bool {
         self.looks.state().is_ok()
     }
 
     /// Whether nothing of it may be read.
-    pub(super) fn is_blind(&self) -> bool {
+    pub(crate) fn is_blind(&self) -> bool {
         self.looks.is_blind()
     }
 
-    pub(super) fn speeds(&self) -> &Speeds {
+    pub(crate) fn speeds(&self) -> &Speeds {
         &self.speeds
     }
 
-    /// Looks at it, before all who wait, and tells what was seen.
-    pub(super) async fn look<E>(&self, line: &Mailbox<E>) -> Result<Look, E> {
+    /// Looks at it, before all who wait where that `is_urgent`, and tells what was seen.
+    pub(crate) async fn look<E>(&self, line: &Mailbox<E>, is_urgent: bool) -> Result<Look, E> {
         let line = line.taken_for(self.same.family());
-        let look = self.looks.look(&line, self.same.unit(), true).await?;
+        let look = self.looks.look(&line, self.same.unit(), is_urgent).await?;
         if !self.is_blind() {
             line.tell(Notice::Saw(look.clone())).await;
         }

@@ -1,0 +1,158 @@
+//! A unit as one call sees it: what it is taken for, what its words mean, what was sent to it, and what it took of the call.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use drivebus_drives::{Entry, Place, Profile, Value};
+use drivebus_rtu::UnitAddress;
+
+use crate::family::Family;
+use crate::look::Look;
+use crate::record::Record;
+use crate::rule::Rule;
+use crate::same_unit::SameUnit;
+use crate::speed::Speeds;
+use crate::taken::Taken;
+use crate::task::{Mailbox, Notice, Read};
+
+/// A unit as one call sees it. A clone is the same call.
+#[derive(Debug, Clone)]
+pub struct Unit {
+    taken: Taken,
+    record: Record,
+    /// How often it had been told to halt when this call began, where it starts something.
+    halts: Option<u64>,
+    /// How many writes of this call it took.
+    parts: Arc<AtomicU64>,
+}
+
+impl Unit {
+    /// The unit as it is `taken`, of which `record` has what was sent to it.
+    pub fn new(taken: Taken, record: &Record) -> Self {
+        Self { taken, record: record.clone(), halts: None, parts: Arc::default() }
+    }
+
+    /// The same call, decided on when the unit had been told to halt so often: where that is another number by then, nothing is
+    /// written. `None` writes in any case.
+    #[must_use]
+    pub fn decided_at(self, halts: Option<u64>) -> Self {
+        Self { halts, ..self }
+    }
+
+    /// Its address.
+    pub fn address(&self) -> UnitAddress {
+        self.taken.same().unit()
+    }
+
+    /// Whether it is what it was named as.
+    pub fn same(&self) -> &SameUnit {
+        self.taken.same()
+    }
+
+    /// What its words mean.
+    pub fn profile(&self) -> &Arc<Profile> {
+        self.taken.profile()
+    }
+
+    /// What was sent to it.
+    pub fn record(&self) -> &Record {
+        &self.record
+    }
+
+    /// How many writes of this call it took.
+    pub fn parts(&self) -> u64 {
+        self.parts.load(Ordering::Relaxed)
+    }
+
+    /// What may be asked of it.
+    pub(crate) fn rule(&self) -> Rule<'_> {
+        self.taken.rule()
+    }
+
+    pub(crate) fn speeds(&self) -> &Speeds {
+        self.taken.speeds()
+    }
+
+    /// What it is taken for.
+    pub(crate) fn family(&self) -> &Arc<Family> {
+        self.same().family()
+    }
+
+    /// How often it had been told to halt when this call began: what is written by it is not sent once that is another number.
+    pub(crate) fn halts(&self) -> Option<u64> {
+        self.halts
+    }
+
+    /// It took a write.
+    pub(crate) fn took_part(&self) {
+        self.parts.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// The same call, whose words are known better: by `profile`.
+    pub(crate) fn with_profile(&self, profile: &Arc<Profile>) -> Self {
+        Self { taken: self.taken.with_profile(profile), ..self.clone() }
+    }
+
+    /// The same call, for a start: once anybody tells the unit to halt, nothing is written to it over this.
+    pub(crate) async fn unless_halted<E>(&self, line: &Mailbox<E>) -> Result<Self, E> {
+        Ok(self.clone().decided_at(line.halts(self.address()).await?))
+    }
+
+    /// Whether the states of its family may be used.
+    pub(crate) fn tells_its_state(&self) -> bool {
+        self.taken.tells_its_state()
+    }
+
+    /// Whether nothing of its state may be read.
+    pub(crate) fn is_blind(&self) -> bool {
+        self.taken.is_blind()
+    }
+
+    /// Looks at it, and tells what was seen.
+    pub(crate) async fn look<E>(&self, line: &Mailbox<E>) -> Result<Look, E> {
+        self.taken.look(line, false).await
+    }
+
+    /// Its output frequency in Hz; `None` where it does not tell.
+    pub(crate) async fn output<E>(&self, line: &Mailbox<E>) -> Result<Option<f64>, E> {
+        self.speeds().output(&line.taken_for(self.family()), self.address(), false).await
+    }
+
+    /// Asks for one word, which tells whether it answers: its state, or else what of it may be read. `false` where nothing may.
+    pub(crate) async fn ping<E>(&self, line: &Mailbox<E>) -> Result<bool, E> {
+        let profile = self.profile();
+        if self.tells_its_state()
+            && let Some(place) = profile.role("state").and_then(Entry::place)
+        {
+            let word = self.word(line, place).await?;
+            line.taken_for(self.family()).tell(Notice::Shows(profile.state(word))).await;
+            return Ok(true);
+        }
+        let roles = ["state", "fault"].into_iter().filter_map(|role| profile.role(role));
+        let mut known = roles.chain(profile.monitor()).chain(profile.entries());
+        let Some(place) = known.find(|entry| self.rule().read(entry).is_ok()).and_then(Entry::place) else {
+            return Ok(false);
+        };
+        self.word(line, place).await.map(|_| true)
+    }
+
+    /// The word at `place`.
+    pub(crate) async fn word<E>(&self, line: &Mailbox<E>, place: Place) -> Result<u16, E> {
+        let words = line.taken_for(self.family()).read(Read::word(self.address(), place)).await?;
+        // One is there: a step takes as many words as were asked for.
+        Ok(words.first().copied().unwrap_or_default())
+    }
+
+    /// The values of `entries`, which may be read, in their order and in the fewest reads.
+    pub(crate) async fn values<E>(&self, line: &Mailbox<E>, entries: &[&Entry]) -> Result<Vec<Value>, E> {
+        let line = line.taken_for(self.family());
+        // What may be read has an address.
+        let Ok(plan) = self.profile().compile(entries) else { return Ok(Vec::new()) };
+        let mut words = Vec::with_capacity(plan.words());
+        for span in plan.reads() {
+            let read = Read::words(self.address(), span.place(), span.count);
+            words.extend(line.read_stamped(read).await?.words);
+        }
+        Ok(plan.values(&words).filter_map(|(_, value)| value).collect())
+    }
+}

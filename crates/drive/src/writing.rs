@@ -1,0 +1,145 @@
+//! One write to a unit: only if it still is what it was, and only where the words do no harm to what it may be instead.
+
+use drivebus_drives::Place;
+use drivebus_rtu::Meaning;
+use thiserror::Error;
+
+use crate::aim::{NotTaken, check_harmless};
+use crate::families::Families;
+use crate::harm::What;
+use crate::same_unit::NotSame;
+use crate::task::{Cause, LineError, Mailbox, Payload, Write};
+use crate::unit::Unit;
+
+/// How often an absolute value is sent once more to a drive that could not take it, as it says.
+const AGAIN: u32 = 4;
+
+/// What is written, and how that is meant.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Words {
+    /// Where the first word goes.
+    pub place: Place,
+    /// What goes there.
+    pub payload: Payload,
+    /// Where the same can be read: there a confirmation that is missing is looked for.
+    pub read_back: Option<u16>,
+    /// Whether it is a value and no command: where the drive says that it is busy or got the request damaged, so that it did
+    /// not take it, it is sent again.
+    pub is_absolute: bool,
+    /// Whether a unit that contradicts its name gets nothing.
+    pub is_judged: bool,
+    /// Whether it goes out also where the line knows the unit as one of a family that does not define it.
+    pub is_forced: bool,
+}
+
+impl Words {
+    /// `payload`, sent once to `place` of a unit that does not contradict its name.
+    pub const fn once(place: Place, payload: Payload) -> Self {
+        Self { place, payload, read_back: None, is_absolute: false, is_judged: true, is_forced: false }
+    }
+
+    /// A value, which can be read at `read_back`.
+    pub fn value(place: Place, payload: Payload, read_back: Option<u16>) -> Self {
+        Self { read_back, is_absolute: true, ..Self::once(place, payload) }
+    }
+}
+
+/// Why a unit is not known to have taken what was written. `E` is the error of whoever drives.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum NotWritten<E> {
+    /// It is not what it was named as, or not known to be. Nothing was sent.
+    #[error("nothing was written: {0}")]
+    NotSame(NotSame<E>),
+    /// It may be of a family that the word would do harm to. Nothing was sent.
+    #[error("nothing was written: {0}")]
+    Harm(NotTaken<E>),
+    /// The line failed, or the unit refused.
+    #[error("{0}")]
+    Failed(E),
+}
+
+impl<E: LineError> NotWritten<E> {
+    /// What went wrong.
+    pub fn cause(&self) -> Cause {
+        match self {
+            Self::NotSame(NotSame::Unsaid(error) | NotSame::Failed(error)) | Self::Failed(error) => error.cause(),
+            Self::Harm(NotTaken::NotTold(why)) => why.cause(),
+            Self::NotSame(_) | Self::Harm(_) => Cause::Other,
+        }
+    }
+
+    /// Whether the write went out: the unit may have taken it then, unless it was refused.
+    pub fn was_sent(&self) -> bool {
+        matches!(self, Self::Failed(error) if error.was_sent())
+    }
+}
+
+impl Unit {
+    /// Writes `words` to it, if it still is the one it was and, where that is judged, does not say that it is another.
+    ///
+    /// # Errors
+    ///
+    /// [`NotWritten`]: its `was_sent` says whether the unit may have taken them.
+    pub async fn write<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        families: &Families,
+        words: &Words,
+    ) -> Result<(), NotWritten<E>> {
+        let is_repeated = words.is_absolute && words.read_back.is_none();
+        let mut again = if is_repeated { 0 } else { AGAIN };
+        let mut connection = self.make_sure(line, families, words).await?;
+        loop {
+            let Err(error) = self.send(line, words, connection).await else { return Ok(()) };
+            match error.cause() {
+                // A port that was lost is opened by what comes next. That was refused, to see first who answers there.
+                Cause::Port if !error.was_sent() && line.connection() != connection => {
+                    connection = self.make_sure(line, families, words).await?;
+                    return self.send(line, words, connection).await.map_err(NotWritten::Failed);
+                }
+                Cause::Refused(code, _) if again < AGAIN && self.family().meaning_of(code) == Meaning::AskAgain => {
+                    again += 1;
+                }
+                _ => return Err(NotWritten::Failed(error)),
+            }
+        }
+    }
+
+    /// The connection over which the unit is what it was, and, where that is judged, takes no harm.
+    async fn make_sure<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        families: &Families,
+        words: &Words,
+    ) -> Result<u64, NotWritten<E>> {
+        let checked = self.same().check(line, families, words.is_judged, false).await;
+        let connection = checked.map_err(NotWritten::NotSame)?;
+        if words.is_judged {
+            let what = What::Word(words.place);
+            check_harmless(line, families, self.same(), what).await.map_err(NotWritten::Harm)?;
+        }
+        Ok(connection)
+    }
+
+    /// Writes to whatever unit answers over this connection. One that says that it took it and is still at it has taken it.
+    async fn send<E: LineError>(&self, line: &Mailbox<E>, words: &Words, connection: u64) -> Result<(), E> {
+        let write = Write {
+            read_back: words.read_back,
+            connection: Some(connection),
+            halts: self.halts(),
+            is_forced: words.is_forced,
+            ..Write::new(self.address(), words.place, words.payload.clone().as_written(self.profile()))
+        };
+        if let Err(error) = line.taken_for(self.family()).write(write).await {
+            match error.cause() {
+                // Where the words can be read, the bus has looked whether they are there.
+                Cause::Refused(code, _) if self.family().meaning_of(code) == Meaning::Taken => {}
+                _ => return Err(error),
+            }
+        }
+        self.took_part();
+        Ok(())
+    }
+}

@@ -1,0 +1,183 @@
+//! `Unit` for Python: one call to a unit, what it commands and writes, and why not, as a kind and what Python words.
+
+use drivebus_drive::task::{Mailbox, Payload};
+use drivebus_drive::{self as drive, Families, Setting, Start, Words};
+use drivebus_drives::{Place, Setpoint};
+use pyo3::IntoPyObjectExt;
+use pyo3::prelude::*;
+
+use crate::clock::duration;
+use crate::convert::place_of;
+use crate::errors::bad_argument;
+use crate::look::Looks;
+use crate::not_done::{not_commanded, not_ready, not_set, not_settled, not_written};
+use crate::record::Record;
+use crate::same_unit::SameUnit;
+use crate::task::{Failed, Task};
+
+/// One call to a unit; see `python/drivebus/_native.pyi`.
+#[pyclass(name = "Unit", frozen, module = "drivebus._native")]
+#[derive(Debug)]
+pub(crate) struct Unit(drive::Unit);
+
+/// A word, or several.
+#[derive(FromPyObject)]
+enum Value {
+    One(u16),
+    Many(Vec<u16>),
+}
+
+#[pymethods]
+impl Unit {
+    #[new]
+    #[pyo3(signature = (unit, looks, record, halts, /))]
+    fn new(unit: &SameUnit, looks: &Looks, record: &Record, halts: Option<u64>) -> Self {
+        let taken = looks.taken(drive::SameUnit::clone(&unit.core()));
+        Self(drive::Unit::new(taken, &record.0).decided_at(halts))
+    }
+
+    #[getter]
+    fn parts(&self) -> u64 {
+        self.0.parts()
+    }
+
+    #[pyo3(signature = (jogs, reverse, hz, confirm, force, /))]
+    fn start(&self, jogs: bool, reverse: bool, hz: Option<f64>, confirm: f64, force: bool) -> Task {
+        let mut start = if jogs { Start::jog(reverse) } else { Start::run(reverse, hz) };
+        (start.confirm, start.is_forced) = (duration(confirm), force);
+        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_commanded(py, why), |()| none(py));
+        self.task(|unit, line| async move { unit.start(&line, Families::shipped(), &start).await }, told)
+    }
+
+    #[pyo3(signature = (confirm, /))]
+    fn reset_fault(&self, confirm: f64) -> Task {
+        let confirm = duration(confirm);
+        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_commanded(py, why), |()| none(py));
+        self.task(|unit, line| async move { unit.reset_fault(&line, Families::shipped(), confirm).await }, told)
+    }
+
+    #[pyo3(signature = (place, word, /))]
+    fn write_moving(&self, place: &Bound<'_, PyAny>, word: u16) -> PyResult<Task> {
+        let place = place_of(place)?;
+        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_commanded(py, why), |()| none(py));
+        let moving = move |unit: drive::Unit, line| async move {
+            unit.write_moving(&line, Families::shipped(), place, word).await
+        };
+        Ok(self.task(moving, told))
+    }
+
+    #[pyo3(signature = (place, value, read_back, absolute, force, /))]
+    fn write(
+        &self,
+        place: &Bound<'_, PyAny>,
+        value: Value,
+        read_back: Option<u32>,
+        absolute: bool,
+        force: bool,
+    ) -> PyResult<Task> {
+        let payload = match value {
+            Value::One(word) => Payload::Word(word),
+            Value::Many(words) => Payload::Words(words),
+        };
+        let mut words = Words::once(place_of(place)?, payload);
+        words.read_back = read_back.and_then(Place::of_number).map(|place| place.address);
+        (words.is_absolute, words.is_forced) = (absolute, force);
+        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_written(py, why), |()| none(py));
+        Ok(self.task(|unit, line| async move { unit.write(&line, Families::shipped(), &words).await }, told))
+    }
+
+    #[pyo3(signature = (word, /))]
+    fn write_frequency(&self, word: u16) -> Task {
+        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_written(py, why), |()| none(py));
+        self.task(move |unit, line| async move { unit.write_frequency(&line, Families::shipped(), word).await }, told)
+    }
+
+    #[pyo3(signature = (hz, /))]
+    fn set_frequency(&self, hz: f64) -> Task {
+        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_set(py, why), |()| none(py));
+        self.task(move |unit, line| async move { unit.set_frequency(&line, Families::shipped(), hz).await }, told)
+    }
+
+    #[pyo3(signature = (hz, /))]
+    fn frequency_word(&self, hz: f64) -> Task {
+        let told =
+            |py: Python<'_>, done: Result<u16, _>| done.map_or_else(|why| not_set(py, why), |word| is_done(py, word));
+        self.task(move |unit, line| async move { unit.frequency_word(&line, hz).await }, told)
+    }
+
+    #[pyo3(signature = (names, /))]
+    fn settled(&self, names: Vec<String>) -> Task {
+        let told = |py: Python<'_>, done: Result<drive::Unit, _>| match done {
+            Ok(unit) => is_done(py, unit.profile().chosen().clone()),
+            Err(why) => not_settled(py, why),
+        };
+        let work = |unit: drive::Unit, line| async move {
+            let names: Vec<_> = names.iter().map(String::as_str).collect();
+            unit.settled(&line, &names).await
+        };
+        self.task(work, told)
+    }
+
+    fn prove_link(&self) -> Task {
+        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_ready(py, why), |()| none(py));
+        self.task(|unit, line| async move { unit.prove_link(&line).await }, told)
+    }
+
+    #[pyo3(signature = (by_bus, /))]
+    fn ready(&self, by_bus: bool) -> Task {
+        let told = |py: Python<'_>, done: Result<_, _>| done.map_or_else(|why| not_ready(py, why), |_| none(py));
+        self.task(move |unit, line| async move { unit.ready(&line, by_bus).await }, told)
+    }
+
+    #[pyo3(signature = (setpoint, /))]
+    fn control(&self, setpoint: &str) -> PyResult<Task> {
+        let setpoint = setpoint_of(setpoint)?;
+        Ok(self.task(move |unit, line| async move { unit.control(&line, setpoint).await }, settings))
+    }
+
+    #[pyo3(signature = (setpoint, /))]
+    fn heeds(&self, setpoint: &str) -> PyResult<Task> {
+        let setpoint = setpoint_of(setpoint)?;
+        Ok(self.task(move |unit, line| async move { unit.heeds(&line, setpoint).await }, settings))
+    }
+}
+
+impl Unit {
+    fn task<T, F>(
+        &self,
+        work: impl FnOnce(drive::Unit, Mailbox<Failed>) -> F,
+        told: impl FnOnce(Python<'_>, T) -> PyResult<Py<PyAny>> + Send + 'static,
+    ) -> Task
+    where
+        T: Send + 'static,
+        F: Future<Output = T> + Send + 'static,
+    {
+        let unit = self.0.clone();
+        Task::of(|line| work(unit, line), told)
+    }
+}
+
+fn setpoint_of(name: &str) -> PyResult<Setpoint> {
+    let known = Setpoint::ALL.into_iter().find(|setpoint| setpoint.name() == name);
+    known.ok_or_else(|| bad_argument(format!("setpoint {name:?} is none")))
+}
+
+fn none(py: Python<'_>) -> PyResult<Py<PyAny>> {
+    is_done(py, ())
+}
+
+fn is_done<'py>(py: Python<'py>, value: impl IntoPyObject<'py>) -> PyResult<Py<PyAny>> {
+    let value = value.into_bound_py_any(py)?;
+    ("done", value).into_py_any(py)
+}
+
+fn settings(py: Python<'_>, done: Result<Vec<Setting>, Failed>) -> PyResult<Py<PyAny>> {
+    is_done(py, done?.into_iter().map(setting).collect::<Vec<_>>())
+}
+
+/// A setting: its code, the word it must hold and the one it holds, label, note, and whether it is verified and set by hand.
+pub(crate) fn setting(setting: Setting) -> (String, u16, Option<i64>, String, String, bool, bool) {
+    let actual = setting.actual.map(drivebus_drives::Value::count);
+    let wanted = setting.wanted;
+    (wanted.code, wanted.raw, actual, wanted.label, wanted.note, wanted.verified, wanted.by_hand)
+}
