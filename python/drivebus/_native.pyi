@@ -44,10 +44,10 @@ __all__ = [
     "Simulator",
     "Sniffer",
     "Task",
+    "Unit",
     "__version__",
     "all_frames_in",
     "begin_of_child",
-    "check_harmless",
     "check_port_options",
     "code_places",
     "code_rows",
@@ -595,13 +595,6 @@ class SameUnit:
 def goes_out_at_once(unit: SameUnit, what: str | int, connection: int, /) -> bool:
     """Whether nothing is asked before *what*, as for `Family`, is sent."""
 
-def check_harmless(unit: SameUnit, what: str | int, /) -> Task:
-    """Makes sure that *what*, as for `Family`, does no harm to the unit.
-
-    Its result is `"harmless"`; `"may_be"` and the families that it may be, which may be none; or `"busy"` as of
-    `identify`.
-    """
-
 def identify(unit: int, /) -> Task:
     """Finds out what *unit* is, by reads of one word each.
 
@@ -660,13 +653,15 @@ class Task:
             connection: The `reconnects` of the line.
             closed: Whether the line was closed for good.
             outcome: What came of the last wish: words of a read, with their moments where that is stamped, or an error
-                of the line; None at the first step, where a sleep is over, a write was confirmed, or a notice was
-                heard.
+                of the line; how many of the last exchanges of a link were good, and how many there were; a number of
+                halts or None, in a tuple; None at the first step, where a sleep is over, a write was confirmed, or a
+                notice was heard.
 
         Returns:
             `"read"` or `"stamped"` and the arguments of a `drivebus.line.asking.Read`; `"write"` and those of a
-            `drivebus.line.asking.Write`; `"sleep"` and seconds of the line's clock; the notice `"took"` and a command
-            that the unit took, or `"saw"` and what `Looks.look` comes to; or `"done"` and the result.
+            `drivebus.line.asking.Write`; `"sleep"` and seconds of the line's clock; `"link"` or `"halts"` and a unit;
+            the notice `"took"` and a command that the unit took, `"saw"` and what `Looks.look` comes to, `"shows"` and
+            a state, or `"starts"` and a command that is about to be sent; or `"done"` and the result.
 
         Raises:
             DrivebusError: It failed; an error of the line that it does not handle comes back as it was given.
@@ -686,8 +681,6 @@ class Record:
     def __new__(cls) -> Record: ...
     def identity(self, family: str, connection: int, /) -> Identity:
         """What it said in the words of *family*, over *connection*, the `reconnects` of the line; nothing at first."""
-    def count_start(self) -> None:
-        """One more start is about to be sent."""
     @property
     def starts(self) -> int:
         """How many starts were sent, or were about to be."""
@@ -709,6 +702,74 @@ class Record:
     def started_unverified(self, is_unverified: bool, /) -> None: ...
 
 @final
+class Unit:
+    """One call to a unit: what it commands and writes, each sent once.
+
+    The result of each task is `"done"` and what it says; or a kind of reason, and what is told of it, which is a kind
+    and what is told of that again:
+
+    `"not_commanded"` has the command or None, the line's clock when that was found, and the kind: `"not_ready"`,
+    `"not_set"` and `"not_written"` as below; `"not_led_up"`, the number of the word of the start sequence, and a kind:
+    `"halted_before"` or `"not_written"` as below, `"halted"`, `"tripped"` and a look as of `Looks.look`, `"port_lost"`
+    and the error, or one of the last look; `"halted"` and the error; `"halted_between"` and the error or None;
+    `"unanswered"`, the error, and a look or the error instead of one; `"refused_and_turns"`, the error and a look;
+    `"port_lost"` and the error; `"unshown"`, the last look and None, or `"unread"` and the error of that; `"ignored"`
+    and settings.
+
+    `"not_ready"`: `"may_not"`, `"unseen"`, `"unstoppable"`; `"bad_link"`, how many of the last exchanges were good and
+    how many there were, and how many looks failed of how many; `"settings"`, what it does otherwise (`"words"`,
+    `"commands"`, `"speed"`) and settings; `"in_fault"`, `"no_voltage"`, `"other_source"`, `"turning"` and a look.
+
+    `"not_set"`: `"no_register"`, `"may_not"`; `"not_settled"` as below; `"not_in_hz"` and the unit; `"above"`, a
+    parameter and its value; `"not_written"`. `"not_settled"`: `"unproved"` or `"unreadable"` and the variant;
+    `"unknown"`, the variant and the raw number. `"not_written"`: `"not_same"` and a result of `SameUnit.check`;
+    `"harm"`, and `"may_be"` and the families that it may be, which may be none, `"busy"` as of `identify`, or
+    `"failed"` and the error of the line; `"failed"` and the error.
+
+    A setting is its code, the word that it must hold, the number that it is or None, label, note, whether it is
+    verified, and whether it is set by hand.
+    """
+
+    def __new__(cls, unit: SameUnit, looks: Looks, record: Record, /) -> Unit:
+        """The *unit* as it was named, the *looks* of its profile, whose trust counts for all, and its *record*."""
+    @property
+    def parts(self) -> int:
+        """How many writes of this call the unit took."""
+    def start(self, jogs: bool, reverse: bool, hz: float | None, confirm: float, force: bool, /) -> Task:
+        """Starts the motor, or jogs it, at *hz*; its state is looked at for *confirm* seconds. Or `"not_commanded"`."""
+    def reset_fault(self, confirm: float, /) -> Task:
+        """Resets a fault, if there is one. Or `"not_commanded"`."""
+    def write_moving(self, place: int, word: int, /) -> Task:
+        """Writes a word that can move the motor. Or `"not_commanded"`."""
+    def write(
+        self, place: int, value: int | Sequence[int], read_back: int | None, absolute: bool, force: bool, /
+    ) -> Task:
+        """Writes a word, or several, which can be read at *read_back*. Or `"not_written"`.
+
+        Args:
+            place: Where the first goes.
+            value: What goes there.
+            read_back: The place where the same can be read.
+            absolute: Whether it is a value and no command, which is sent again where it was not taken.
+            force: Whether it goes out also where the line knows the unit as one of a family that does not define it.
+        """
+    def write_frequency(self, word: int, /) -> Task:
+        """Writes the frequency, as the drive counts it. Or `"not_written"`."""
+    def set_frequency(self, hz: float, /) -> Task:
+        """Gives the frequency *hz*, up to the drive's own maximum. Or `"not_set"`."""
+    def frequency_word(self, hz: float, /) -> Task:
+        """*hz* as the drive counts it, up to its own maximum. Or `"not_set"`."""
+    def settled(self, names: Sequence[str], /) -> Task:
+        """All variants that are chosen, with those on which *names* depend. Or `"not_settled"`."""
+    def prove_link(self) -> Task:
+        """Looks at the state where the last exchanges failed. Or `"not_ready"`."""
+    def ready(self, by_bus: bool, /) -> Task:
+        """Whether the drive may start, and where *by_bus* obeys the bus. Or `"not_ready"`."""
+    def control(self, setpoint: str, /) -> Task:
+        """What must be set so that the bus commands the drive, and gives it *setpoint*: settings."""
+    def heeds(self, setpoint: str, /) -> Task:
+        """What must be set so that the drive heeds *setpoint*: settings."""
+
 class Halt:
     """One unit that is to be halted: sent until it takes it, and proved.
 
@@ -896,6 +957,9 @@ class Profile:
         """The words before a run: `word`, `label`, `until`, `mask`, `value`."""
     @property
     def command_address(self) -> int | None: ...
+    @property
+    def is_written_by_many(self) -> bool:
+        """Whether a single word is written by 10H."""
     def stored_address(self, address: int, /) -> int | None:
         """The plain address behind one with the memory bit; None if *address* has not that bit."""
     def memory(self) -> dict[str, Any] | None:

@@ -136,6 +136,8 @@ impl Unit {
         place: Place,
         word: u16,
     ) -> Result<(), NotCommanded<E>> {
+        let is_unverified = self.rule().trusts_all();
+        self.record().note(|sent| sent.started_unverified |= is_unverified);
         let words = Words::once(place, Payload::Word(word));
         self.send_moving(line, families, &words).await.map_err(|why| self.not_commanded(line, None, why))
     }

@@ -32,13 +32,6 @@ impl Unit {
         Self { taken, record: record.clone(), halts: None, parts: Arc::default() }
     }
 
-    /// The same call, decided on when the unit had been told to halt so often: where that is another number by then, nothing is
-    /// written. `None` writes in any case.
-    #[must_use]
-    pub fn decided_at(self, halts: Option<u64>) -> Self {
-        Self { halts, ..self }
-    }
-
     /// Its address.
     pub fn address(&self) -> UnitAddress {
         self.taken.same().unit()
@@ -95,7 +88,7 @@ impl Unit {
 
     /// The same call, for a start: once anybody tells the unit to halt, nothing is written to it over this.
     pub(crate) async fn unless_halted<E>(&self, line: &Mailbox<E>) -> Result<Self, E> {
-        Ok(self.clone().decided_at(line.halts(self.address()).await?))
+        Ok(Self { halts: line.halts(self.address()).await?, ..self.clone() })
     }
 
     /// Whether the states of its family may be used.

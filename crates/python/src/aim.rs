@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use crate::family::{names, what_of};
 use crate::identify::not_told;
 use crate::same_unit::SameUnit;
-use crate::task::{Failed, Task, unknown};
+use crate::task::{Failed, unknown};
 
 /// Whether nothing is asked before `what` is sent; see `python/drivebus/_native.pyi`.
 #[pyfunction]
@@ -15,18 +15,7 @@ pub(crate) fn goes_out_at_once(unit: &SameUnit, what: &Bound<'_, PyAny>, connect
     Ok(drive::goes_out_at_once(&unit.core(), Families::shipped(), what_of(what)?, connection))
 }
 
-/// Makes sure that `what` does no harm to the unit; see `python/drivebus/_native.pyi`.
-#[pyfunction]
-#[pyo3(signature = (unit, what, /))]
-pub(crate) fn check_harmless(unit: &SameUnit, what: &Bound<'_, PyAny>) -> PyResult<Task> {
-    let (unit, what) = (unit.core(), what_of(what)?);
-    let told = |py: Python<'_>, done: Result<(), NotTaken<Failed>>| match done {
-        Ok(()) => Ok(("harmless", ()).into_pyobject(py)?.into_any().unbind()),
-        Err(error) => not_taken(py, error),
-    };
-    Ok(Task::of(|line| async move { drive::check_harmless(&line, Families::shipped(), &unit, what).await }, told))
-}
-
+/// Why nothing may be written to a unit: of which kind that is, and what is told of it.
 pub(crate) fn not_taken(py: Python<'_>, error: NotTaken<Failed>) -> PyResult<Py<PyAny>> {
     match error {
         NotTaken::NotTold(error) => not_told(py, error),

@@ -50,7 +50,7 @@ mod _native {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::aim::{check_harmless, goes_out_at_once};
+    use crate::aim::goes_out_at_once;
     #[pymodule_export]
     use crate::bus::Bus;
     #[pymodule_export]

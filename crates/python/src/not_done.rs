@@ -1,7 +1,8 @@
 //! Why something was not done to a unit, for Python: of which kind the reason is, and what of it Python words.
 
 use drivebus_drive::{
-    Ignores, NotCommanded, NotLedUp, NotReady, NotSet, NotSettled, NotWritten, WhyNotCommanded, WhyNotLedUp,
+    Ignores, NotCommanded, NotLedUp, NotReady, NotSame, NotSet, NotSettled, NotTaken, NotTold, NotWritten,
+    WhyNotCommanded, WhyNotLedUp,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -118,9 +119,12 @@ fn settled_told(py: Python<'_>, why: NotSettled<Failed>) -> PyResult<Told> {
 
 fn written_told(py: Python<'_>, why: NotWritten<Failed>) -> PyResult<Told> {
     Ok(match why {
+        NotWritten::Failed(error) | NotWritten::NotSame(NotSame::Failed(error)) => ("failed", raised(py, error)?),
         NotWritten::NotSame(why) => ("not_same", checked(py, Err(why))?),
+        NotWritten::Harm(NotTaken::NotTold(NotTold::Failed(error))) => {
+            ("harm", ("failed", raised(py, error)?).into_py_any(py)?)
+        }
         NotWritten::Harm(why) => ("harm", not_taken(py, why)?),
-        NotWritten::Failed(error) => ("failed", raised(py, error)?),
         why => return Err(unknown(&why)),
     })
 }

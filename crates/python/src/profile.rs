@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use drivebus_drive::task::Payload;
 use drivebus_drives::{self as drives, Command, Entry, Input, Place, ProfileError, Setpoint, Store};
 use drivebus_rtu::{ExceptionCode, Meanings};
 use pyo3::prelude::*;
@@ -309,6 +310,12 @@ impl Profile {
 
     fn start_sequence<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         tables::start_sequence(py, &self.0)
+    }
+
+    /// Whether a single word is written by 10H.
+    #[getter]
+    fn is_written_by_many(&self) -> bool {
+        matches!(Payload::Word(0).as_written(&self.0), Payload::Words(_))
     }
 
     #[getter]

@@ -24,10 +24,6 @@ impl Record {
         Identity(self.0.identity(family, connection))
     }
 
-    fn count_start(&self) {
-        self.0.note(|sent| sent.starts += 1);
-    }
-
     #[getter]
     fn starts(&self) -> u64 {
         self.0.sent().starts

@@ -30,10 +30,9 @@ enum Value {
 #[pymethods]
 impl Unit {
     #[new]
-    #[pyo3(signature = (unit, looks, record, halts, /))]
-    fn new(unit: &SameUnit, looks: &Looks, record: &Record, halts: Option<u64>) -> Self {
-        let taken = looks.taken(drive::SameUnit::clone(&unit.core()));
-        Self(drive::Unit::new(taken, &record.0).decided_at(halts))
+    #[pyo3(signature = (unit, looks, record, /))]
+    fn new(unit: &SameUnit, looks: &Looks, record: &Record) -> Self {
+        Self(drive::Unit::new(looks.taken(drive::SameUnit::clone(&unit.core())), &record.0))
     }
 
     #[getter]

@@ -15,7 +15,7 @@ from typing import Any
 
 from drivebus import _native
 from drivebus.advice import Text
-from drivebus.errors import WrongDrive
+from drivebus.errors import DrivebusError, WrongDrive
 from drivebus.identify.contradiction import in_words
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.tasks import carried_out
@@ -80,17 +80,25 @@ class SameUnit:
         if kind == "same":
             connection: int = told
             return connection
-        if kind == "unsaid":
-            # `started` stays None: of what was to follow, nothing left.
-            raise type(told)(f"{self._unsaid()} ({told}); nothing was written", unit=self._unit, raw=told.raw) from told
-        raise WrongDrive(self._not_same(kind, told), unit=self._unit)
+        raise self.not_same(kind, told)
 
     async def contradiction(self, bus: AwaitableBus) -> str | None:
         """What the unit says against its profile, and what to do; None if nothing. Asks it in any case."""
         against = await carried_out(self.seen_as(self._profile).contradiction(), bus)
         return None if against is None else in_words(self._profile, self._unit, against)
 
-    def _not_same(self, kind: str, told: Any) -> str:
+    def not_same(self, kind: str, told: Any) -> DrivebusError:
+        """Why nothing may be written to the unit: of which *kind* that is, and what is *told* of it."""
+        if kind != "unsaid":
+            return WrongDrive(self._told(kind, told), unit=self._unit)
+        # `started` stays None: of what was to follow, nothing left.
+        error: DrivebusError = type(told)(
+            f"{self._unsaid()} ({told}); nothing was written", unit=self._unit, raw=told.raw
+        )
+        error.__cause__ = told
+        return error
+
+    def _told(self, kind: str, told: Any) -> str:
         if kind == "contradicts":
             return Text(in_words(self._profile, self._unit, told), "; nothing was written to it")
         if kind == "put_off":

@@ -8,18 +8,19 @@ from __future__ import annotations
 import sys
 from collections.abc import Awaitable, Callable
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from typing import Any, TypeAlias
 
 from drivebus._native import Task
 from drivebus.errors import DrivebusError
 from drivebus.line.asking import Ask, Read, Stamped, Write
-from drivebus.line.protocols import AwaitableBus
+from drivebus.line.protocols import AwaitableBus, AwaitsHalts
 
 __all__ = ["LOGGER", "carried_out", "carried_out_by"]
 
 LOGGER = "drivebus.operations"
 
-_Outcome: TypeAlias = "list[int] | Stamped | DrivebusError | None"
+_Outcome: TypeAlias = "list[int] | Stamped | tuple[int | None, ...] | DrivebusError | None"
 _Around: TypeAlias = Callable[[], AbstractContextManager[None]]
 _Hears: TypeAlias = Callable[[str, Any], None]
 
@@ -59,6 +60,10 @@ async def carried_out(task: Task, bus: AwaitableBus, around: _Around = nullconte
             outcome = await _outcome_of(bus.ask_stamped, Read(*told), around)
         elif kind == "write":
             outcome = await _outcome_of(bus.ask, Write(*told), around)
+        elif kind == "link":
+            outcome = await _outcome_of(partial(_link, bus), told, nullcontext)
+        elif kind == "halts":
+            outcome = await _outcome_of(partial(_halts, bus), told, nullcontext)
         else:
             hears(kind, told)
 
@@ -76,11 +81,22 @@ async def carried_out_by(task: Task, ask: Ask) -> Any:
         outcome = await _outcome_of(ask, Read(*told), nullcontext)
 
 
+async def _link(bus: AwaitableBus, unit: int) -> tuple[int, int]:
+    """How many of the last exchanges with *unit* brought an answer, and how many there were."""
+    link = await bus.link(unit)
+    return link.good, link.asked
+
+
+async def _halts(bus: AwaitableBus, unit: int) -> tuple[int | None]:
+    """How often *unit* was told to halt, where the line counts that."""
+    return (await bus.halts(unit) if isinstance(bus, AwaitsHalts) else None,)
+
+
 async def _outcome_of(do: Callable[[Any], Awaitable[Any]], what: object, around: _Around) -> _Outcome:
     """What comes of *what*, errors included. They know this frame, and not that of whoever keeps them."""
     try:
         with around():
-            outcome: list[int] | Stamped | None = await do(what)
+            outcome: list[int] | Stamped | tuple[int | None, ...] | None = await do(what)
     except DrivebusError as error:
         _tell(what, f"{type(error).__name__}: {error}")
         return error

@@ -11,17 +11,17 @@ What is asked, and as what the unit is taken, is decided in the core (`crates/dr
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from drivebus import _native
 from drivebus.advice import Text, argument
-from drivebus.errors import LINE_ERRORS, NotAllowed, WrongDrive
+from drivebus.errors import LINE_ERRORS, DrivebusError, NotAllowed, WrongDrive
 from drivebus.identify.families import asked_as, one_of
 from drivebus.identify.refusals import busy
-from drivebus.line.tasks import carried_out
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
 
-__all__ = ["check_harmless", "goes_out_at_once", "profiles_of", "undecided"]
+__all__ = ["goes_out_at_once", "harmed", "profiles_of", "undecided"]
 
 
 def goes_out_at_once(unit: DriveView, what: str | int) -> bool:
@@ -37,32 +37,27 @@ def goes_out_at_once(unit: DriveView, what: str | int) -> bool:
     return _native.goes_out_at_once(_seen(unit), what, unit.bus.reconnects)
 
 
-async def check_harmless(unit: DriveView, what: str | int) -> None:
-    """Makes sure that *what* is not sent to a unit of a family that it would do harm to.
+def harmed(unit: DriveView, kind: str, told: Any) -> DrivebusError:
+    """Why nothing was written to *unit*: of which *kind* that is, and what is *told* of it, as the core has them.
 
-    Sends reads, and only where the line has not identified the unit.
-
-    Args:
-        unit: The unit, as it was named.
-        what: A command that does not halt, or a place that any word may be written to.
-
-    Raises:
-        NotAllowed: It shows such a family, or may be one. Nothing was written.
-        NoAnswer, BadAnswer, PortError: The line failed, or the unit is busy; nothing was written.
+    It shows a family that would take harm, or may be one; or the line failed, or the unit is busy.
     """
-    try:
-        kind, told = await carried_out(_native.check_harmless(_seen(unit), what), unit.bus)
-        if kind == "busy":
-            raise busy(unit.address, *told) from told[-1]
-    except LINE_ERRORS as error:
-        # `started` stays None: of what was to follow, nothing left.
-        raise type(error)(
-            f"unit {unit.address} does not say what it is ({error}); nothing was written to it",
-            unit=unit.address,
-            raw=error.raw,
-        ) from error
     if kind == "may_be":
-        raise _another(unit, profiles_of(unit, told))
+        return _another(unit, profiles_of(unit, told))
+    error: DrivebusError = told
+    if kind == "busy":
+        error = busy(unit.address, *told)
+        error.__cause__ = told[-1]
+    if not isinstance(error, LINE_ERRORS):
+        return error
+    # `started` stays None: of what was to follow, nothing left.
+    unsaid = type(error)(
+        f"unit {unit.address} does not say what it is ({error}); nothing was written to it",
+        unit=unit.address,
+        raw=error.raw,
+    )
+    unsaid.__cause__ = error
+    return unsaid
 
 
 def _seen(unit: DriveView) -> _native.SameUnit:

@@ -6,12 +6,12 @@ never repeated, under the checks of a command.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
-from drivebus import checks
+from drivebus import _native, checks
 from drivebus.errors import BadArgument, NotAllowed
-from drivebus.operations import bus_control, commands, raw_words, setpoints, start_checks
-from drivebus.operations.commands import A_WORD
+from drivebus.operations import bus_control, not_commanded, not_ready, raw_words, setpoints
+from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
 from drivebus.values import Description
 
@@ -116,10 +116,11 @@ async def _set_bits(unit: DriveView, setpoint: str, given: Mapping[str, object],
         unit.evidence.require_bits(register, name)
     moves = unit.profile.is_command(unit.profile.address(register))
     if moves:
-        start_checks.can_be_stopped(unit)
-        await start_checks.prove_link(unit, checks.flag("force", force))
+        not_ready.can_be_stopped(unit)
+        if not checks.flag("force", force):
+            await _check_ready(unit, _native.Unit.prove_link)
         # These words stand in for terminals, so the drive need not take its commands from the bus.
-        await start_checks.ready_to_start(unit, by_bus=False)
+        await _check_ready(unit, lambda core: core.ready(False))
     await bus_control.check_heeded(unit, setpoint, register)
     # What can only be written tells nothing: there, what is not named is off.
     word = 0 if known.access == "wo" else await _word(unit, register)
@@ -129,8 +130,16 @@ async def _set_bits(unit: DriveView, setpoint: str, given: Mapping[str, object],
     if not moves:
         await raw_words.write(unit, address, word, read_back=unit.profile.read_back(register))
         return
-    unit.record.sent.started_unverified |= unit.unverified
-    await commands.send_word(unit, A_WORD, address, word)
+    kind, told = await call_core(unit, lambda core: core.write_moving(address, word))
+    if kind != "done":
+        raise not_commanded.in_words(unit, *told, confirm=0.0)
+
+
+async def _check_ready(unit: DriveView, wanted: Callable[[_native.Unit], _native.Task]) -> None:
+    """Raises `NotAllowed` where the drive may not be started."""
+    kind, told = await call_core(unit, wanted)
+    if kind != "done":
+        raise not_ready.in_words(unit, None, *told)
 
 
 def _masks(unit: DriveView, name: str) -> dict[str, int]:

@@ -6,27 +6,21 @@ written only for who says so.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from typing import Any
+
 from drivebus import checks
 from drivebus.advice import Advice, Text, argument, call
-from drivebus.errors import BadAnswer, NoAnswer, NotReady, PortError, Refused, Unconfirmed
+from drivebus.errors import NotReady, Unconfirmed
 from drivebus.operations import parameter_writes, parameters, registers
 from drivebus.operations.by_name import by_name
+from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.in_parts import in_parts
 from drivebus.profile.evidence import not_verified
-from drivebus.profile.facts import Setting
 from drivebus.values import Control, ControlItem
 
-__all__ = [
-    "check_control",
-    "check_heeded",
-    "check_set",
-    "prepare_control",
-    "wanted_always",
-    "wanted_for",
-    "wanted_of_commands",
-    "why_ignored",
-]
+__all__ = ["check_control", "check_heeded", "item_of", "prepare_control"]
 
 
 async def check_control(unit: DriveView, setpoint: str | None = None, *, unverified: bool = False) -> Control:
@@ -41,7 +35,7 @@ async def check_control(unit: DriveView, setpoint: str | None = None, *, unverif
         NoAnswer, BadAnswer, Refused: See each.
     """
     unit = unit.trusting(unverified)
-    return await _check_items(unit, wanted_for(unit, setpoint))
+    return _shown(unit, await _settings(unit, setpoint))
 
 
 @by_name("store", after=0)
@@ -66,12 +60,12 @@ async def prepare_control(
     """
     store = checks.flag("store", store)
     unit = unit.trusting(unverified)
-    wanted = wanted_for(unit, setpoint)
     needed = {}
-    for row, item in zip(wanted, await _check_items(unit, wanted), strict=True):
+    for row in await _settings(unit, setpoint):
+        item, by_hand = item_of(unit, row), row[-1]
         if item.ok and not (store and parameter_writes.is_in_ram(unit, item.code)):
             continue
-        if item.actual is not None and row.by_hand:
+        if item.actual is not None and by_hand:
             raise NotReady(
                 Text(
                     f"{item.code} of unit {unit.address} is {int(item.actual)}, and must be {int(item.wanted)} "
@@ -91,7 +85,7 @@ async def prepare_control(
         needed[item.code] = item.wanted
     if needed:
         await parameters.write(unit, needed, store=store)
-    control = await _check_items(unit, wanted)
+    control = _shown(unit, await _settings(unit, setpoint))
     if not control:
         raise Unconfirmed(
             f"unit {unit.address} took the settings and shows others:\n{control}",
@@ -102,7 +96,8 @@ async def prepare_control(
 
 async def check_heeded(unit: DriveView, setpoint: str, register: str) -> None:
     """Raises `NotAllowed` if the drive would not heed *setpoint*, because it takes that from elsewhere."""
-    control = await _check_items(unit, unit.profile.needs(setpoint))
+    _, rows = await call_core(unit, lambda core: core.heeds(setpoint))
+    control = _shown(unit, rows)
     if not control:
         raise NotReady(
             Text(
@@ -118,74 +113,28 @@ async def check_heeded(unit: DriveView, setpoint: str, register: str) -> None:
         )
 
 
-async def check_set(unit: DriveView, wanted: list[Setting], what: str) -> None:
-    """Raises `NotAllowed` if one of *wanted* is surely not as it must be: then the unit does *what* is said.
-
-    What no document proves, or may not be read, keeps nobody from starting a motor.
-    """
-    sure = [row for row in wanted if row.verified or unit.unverified]
-    wrong = Control(item for item in await _check_items(unit, sure) if item.actual is not None and not item.ok)
-    if len(wrong):
-        raise NotReady(
-            Text(
-                f"unit {unit.address} {what}:\n{wrong}\nNothing that moves it was sent. ",
-                call("prepare_control"),
-                " sets what is needed",
-            ),
-            why="settings",
-            unit=unit.address,
-        )
-
-
-async def why_ignored(unit: DriveView) -> str:
-    """Which settings keep the drive from taking commands from the bus; empty where none is known to, or none tells."""
-    wanted = [row for row in wanted_of_commands(unit) if row.verified or unit.unverified]
-    try:
-        items = await _check_items(unit, wanted)
-    except (NoAnswer, BadAnswer, Refused, PortError):
-        return ""
-    return ", ".join(
-        f"{item.code} is {int(item.actual)}, needs {int(item.wanted)}"
-        for item in items
-        if item.actual is not None and not item.ok
+def item_of(unit: DriveView, row: Sequence[Any]) -> ControlItem:
+    """A setting of *unit*, of which the core told this *row*."""
+    code, wanted, actual, label, note, verified, _ = row
+    return ControlItem(
+        code=code,
+        wanted=registers.value(unit, code, wanted),
+        actual=None if actual is None else registers.value(unit, code, actual & 0xFFFF),
+        ok=actual == wanted,
+        verified=verified,
+        label=label,
+        note=(unit.evidence.unreadable(code) if actual is None else None) or note,
     )
 
 
-def wanted_of_commands(unit: DriveView) -> list[Setting]:
-    """What must be set for commands alone, whatever the setpoints."""
-    names = unit.profile.setpoint_names()
-    of_setpoints = {row.code for name in names for row in unit.profile.needs(name)}
-    return [row for row in unit.profile.control() if row.code not in of_setpoints]
-
-
-def wanted_always(unit: DriveView) -> list[Setting]:
-    """What must be set in any case, or the words of the profile are not where it has them."""
-    return [row for row in unit.profile.control() if row.always]
-
-
-def wanted_for(unit: DriveView, setpoint: str | None) -> list[Setting]:
-    """What must be set for *setpoint*, in the order in which to set it."""
-    known = unit.profile.setpoint_names()
+async def _settings(unit: DriveView, setpoint: str | None) -> list[Sequence[Any]]:
+    """What must be set for *setpoint*, in the order in which to set it, and what is set, as the core tells it."""
     if setpoint is not None:
-        checks.one_of("setpoint", setpoint, known)
-    of_frequency = unit.profile.needs("frequency") if "frequency" in known else []
-    needs = of_frequency if setpoint is None else unit.profile.needs(setpoint)
-    told = {row.code for row in (*of_frequency, *needs)}
-    return [*(row for row in unit.profile.control() if row.code not in told), *needs]
+        checks.one_of("setpoint", setpoint, unit.profile.setpoint_names())
+    _, rows = await call_core(unit, lambda core: core.control(setpoint or "frequency"))
+    settings: list[Sequence[Any]] = rows
+    return settings
 
 
-async def _check_items(unit: DriveView, wanted: list[Setting]) -> Control:
-    codes = unit.evidence.readable(row.code for row in wanted)
-    actual = await registers.snapshot(unit, *codes) if codes else {}
-    return Control(
-        ControlItem(
-            code=row.code,
-            wanted=registers.value(unit, row.code, row.value),
-            actual=actual.get(row.code),
-            ok=row.code in actual and actual[row.code] == row.value,
-            verified=row.verified,
-            label=row.label,
-            note=(None if row.code in actual else unit.evidence.unreadable(row.code)) or row.note or "",
-        )
-        for row in wanted
-    )
+def _shown(unit: DriveView, settings: Iterable[Sequence[Any]]) -> Control:
+    return Control(item_of(unit, row) for row in settings)

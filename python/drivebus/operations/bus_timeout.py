@@ -12,8 +12,8 @@ from drivebus import checks
 from drivebus._native import FALL_PATIENCE
 from drivebus.errors import BadArgument, DrivebusError, Unconfirmed
 from drivebus.operations import parameters, registers, speed, state
-from drivebus.operations.commands import POLL_INTERVAL
 from drivebus.operations.drive_view import DriveView
+from drivebus.operations.glances import POLL_INTERVAL
 from drivebus.operations.in_parts import counted
 from drivebus.operations.last_will import LastWill
 from drivebus.profile.evidence import not_verified

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from drivebus import checks
 from drivebus.identify.same_unit import SameUnit
-from drivebus.line.protocols import AwaitableBus, AwaitsHalts
+from drivebus.line.protocols import AwaitableBus
 from drivebus.line.units import UnitRecord, units_of
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
@@ -35,8 +35,6 @@ class DriveView:
         evidence: Its profile, under one trust.
         record: What the line knows of it.
         identity: Whether it is what its profile says, and still the one it was.
-        halts: How often it had been told to halt when this view was made for a start: where it was told to since, this
-            view writes nothing any more.
         taken: What the drive took of the call that this view was made for, where that is counted.
     """
 
@@ -45,7 +43,6 @@ class DriveView:
     evidence: Evidence
     record: UnitRecord
     identity: SameUnit
-    halts: int | None = None
     taken: Taken | None = None
 
     @classmethod
@@ -84,12 +81,6 @@ class DriveView:
         if not checks.flag("unverified", unverified) or self.unverified:
             return self
         return replace(self, evidence=self.evidence.trusting(True))
-
-    async def unless_halted(self) -> DriveView:
-        """The same unit, for a start: once somebody tells it to halt, nothing is written to it over this view."""
-        if not isinstance(self.bus, AwaitsHalts):
-            return self
-        return replace(self, halts=await self.bus.halts(self.address))
 
     def taken_for(self, profile: Profile) -> DriveView:
         """The same unit, which shows that it is of *profile* and not what it was named as; trusted as that."""

@@ -10,8 +10,10 @@ from typing import Any
 
 from drivebus import _native
 from drivebus.line.tasks import carried_out
-from drivebus.operations import commands, events, raw_words, state
+from drivebus.operations import glances
+from drivebus.operations.core_calls import hear
 from drivebus.operations.drive_view import DriveView
+from drivebus.operations.explained import explained
 from drivebus.operations.not_halted import in_words
 from drivebus.profile import Profile
 
@@ -35,7 +37,7 @@ class Halt:
     def __init__(self, unit: DriveView, command: str, confirm: float, within: float, *, coasts: bool = False) -> None:
         self._unit = unit
         self._taken_for: dict[str, DriveView] = {unit.profile.name: unit}
-        looks = state.planned(unit.evidence).looks
+        looks = glances.planned(unit.evidence).looks
         same, sent = unit.identity.seen_as(unit.profile), unit.record.sent
         self._halt = _native.Halt(same, looks, sent, command, coasts, within, confirm, unit.bus.now())
 
@@ -67,17 +69,14 @@ class Halt:
         self._halt.wait(seconds)
 
     async def _done(self, task: _native.Task) -> bool:
-        def explained() -> AbstractContextManager[None]:
-            return nullcontext() if task.family is None else raw_words.explained(self._as(task.family))
+        def around() -> AbstractContextManager[None]:
+            return nullcontext() if task.family is None else explained(self._as(task.family))
 
         def hears(kind: str, told: Any) -> None:
             unit = self._unit if task.family is None else self._as(task.family)
-            if kind == "took":
-                events.took(unit, commands.said(told))
-            else:
-                state.keep(unit, state.shown(unit, told))
+            hear(unit, kind, told)
 
-        kind, told = await carried_out(task, self._unit.bus, explained, hears)
+        kind, told = await carried_out(task, self._unit.bus, around, hears)
         if kind == "not_halted":
             family, *reason = told
             raise in_words(self._unit, self._as(family), *reason)

@@ -14,8 +14,8 @@ from drivebus.identify.contradiction import contradiction
 from drivebus.identify.refusals import Answer
 from drivebus.line.protocols import KeepsWills
 from drivebus.operations.drive_view import DriveView
-from drivebus.operations.raw_words import as_written
 from drivebus.profile import Profile
+from drivebus.profile.profile import native_of
 
 __all__ = ["WAYS", "LastWill", "look_of", "requests_of"]
 
@@ -85,7 +85,7 @@ def _write(profile: Profile, place: int, word: int) -> bytes:
     table, address = tables.split(place)
     if table == "coil":
         return bytes([_WRITE_COIL]) + address.to_bytes(2, "big") + (b"\xff\0" if word else b"\0\0")
-    return _pdu(rtu.encode_write(_ANY, address, as_written(profile, word)))
+    return _pdu(rtu.encode_write(_ANY, address, [word] if native_of(profile).is_written_by_many else word))
 
 
 def _pdu(frame: bytes) -> bytes:

@@ -9,16 +9,13 @@ from __future__ import annotations
 
 from drivebus import checks
 from drivebus.advice import Text, call
-from drivebus.errors import LINE_ERRORS, BadArgument, Refused, Unconfirmed
-from drivebus.look import Look
-from drivebus.operations import bus_control, commands, setpoints, speed, start_checks, start_sequence, state
-from drivebus.operations.aim import check_harmless
+from drivebus.errors import BadArgument
+from drivebus.operations import not_commanded
 from drivebus.operations.by_name import by_name
+from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.halting import WITHIN, Halt
 from drivebus.operations.in_parts import in_parts
-from drivebus.operations.program_end import before_start
-from drivebus.values import State
 
 __all__ = [
     "coast",
@@ -74,19 +71,8 @@ async def run(
         Unconfirmed: The command was sent; the message names the state seen last. It is not repeated. Or the family
             wants other words before it, and the drive does not show one of them: then the command was not sent.
     """
-    confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-    command = "run_reverse" if reverse else "run_forward"
-    unit = unit.trusting(unverified)
-    start_checks.may_be_given(unit, command)
-    unit = await unit.unless_halted()
-    await start_checks.prove_link(unit, force)
-    if hz is not None:
-        unit = await setpoints.with_setpoint(unit, "frequency")
-    raw = None if hz is None else await setpoints.word_of(unit, hz)
-    before = await start_checks.ready_to_start(unit)
-    if hz is not None:
-        await bus_control.check_set(unit, unit.profile.needs("frequency"), "would not take its speed from the bus")
-    await _start(unit, command, raw, reverse, before, confirm)
+    hz = None if hz is None else checks.number("setpoint", hz, 0.0)
+    await _start(unit.trusting(unverified), False, hz, reverse, confirm, force)
 
 
 @by_name("reverse", after=0)
@@ -99,15 +85,7 @@ async def jog(
     A motor that turns already is not jogged (`NotAllowed`): its state would look like a jog, and `jog_stop` would
     not end it.
     """
-    confirm = checks.number("confirm", confirm, 0.0, 3600.0)
-    command = "jog_reverse" if reverse else "jog_forward"
-    unit = unit.trusting(unverified)
-    start_checks.may_be_given(unit, command)
-    unit = await unit.unless_halted()
-    await start_checks.prove_link(unit, force)
-    before = await start_checks.ready_to_start(unit)
-    start_checks.check_at_rest(unit, before)
-    await _start(unit, command, None, reverse, before, confirm)
+    await _start(unit.trusting(unverified), True, None, reverse, confirm, force)
 
 
 async def stop(unit: DriveView, *, confirm: float = 1.0, within: float = WITHIN, unverified: bool = False) -> None:
@@ -198,83 +176,17 @@ async def reset_fault(unit: DriveView, *, confirm: float = 1.0, unverified: bool
     """
     confirm = checks.number("confirm", confirm, 0.0, 3600.0)
     unit = unit.trusting(unverified)
-    unit.evidence.require_command("reset_fault")
-    unit = await unit.unless_halted()
-    before = await state.glance(unit)
-    untold = "state" in before.missing and "fault" in before.missing
-    if not (before.tripped or untold):
-        return
-
-    async def shows(seen: Look) -> bool:
-        return not seen.tripped and ("state" in seen.missing or seen.state is not State.UNKNOWN)
-
-    await check_harmless(unit, "reset_fault")
-    await commands.send(unit, "reset_fault")
-    try:
-        await commands.confirm(unit, "reset_fault", shows, confirm)
-    except Unconfirmed as error:
-        ignored = await bus_control.why_ignored(unit)
-        if not ignored:
-            raise
-        raise Unconfirmed(
-            Text(
-                f"unit {unit.address} did not reset: it does not take commands from the bus ({ignored}). The reset was "
-                "sent once; ",
-                call("prepare_control"),
-                " sets the drive to obey the bus",
-            ),
-            unit=unit.address,
-        ) from error
+    kind, told = await call_core(unit, lambda core: core.reset_fault(confirm))
+    if kind != "done":
+        raise not_commanded.in_words(unit, *told, confirm=confirm)
 
 
-async def _start(
-    unit: DriveView, command: str, setpoint: int | None, reverse: bool, before: Look, confirm: float
-) -> None:
-    wanted = State.REVERSE if reverse else State.FORWARD
-    turning_round = before.state.running and before.state is not wanted
-    frequency = await speed.output_frequency(unit) if turning_round else None
-    # Who started it so must not be kept from stopping it.
-    unit.record.sent.started_unverified |= unit.unverified
-    before_start()
-    # Before it is sent: whoever is interrupted from here on has to end it.
-    unit.record.sent.count_start()
-    unit.record.started_under = unit.profile
-    unit.record.sent.started_as = (State.UNKNOWN if command.startswith("jog") else wanted).value
-    prepared = await commands.prepared(unit, command, setpoint)
-    if not before.state.running:
-        await start_sequence.lead_up(unit, command, confirm)
-    try:
-        await commands.send(unit, command, prepared)
-    except Refused as error:
-        if not before.state.running:
-            await _check_that_it_stands(unit, command, error)
-        raise
-
-    async def shows(seen: Look) -> bool:
-        if "state" in seen.missing:
-            return seen.fault is None
-        if seen.state is wanted:
-            return True
-        # A motor that turns the other way must slow down first; its state word follows at zero.
-        now = await speed.output_frequency(unit) if turning_round else None
-        return now is not None and frequency is not None and now < frequency
-
-    await commands.confirm(unit, command, shows, confirm)
-
-
-async def _check_that_it_stands(unit: DriveView, command: str, refused: Refused) -> None:
-    """A drive that refuses a start may have taken it: one look tells, where it can be read."""
-    try:
-        seen = await state.glance(unit)
-    except (*LINE_ERRORS, Refused):
-        return
-    if seen.state.running:
-        raise Unconfirmed(
-            f"{commands.said(command)} was sent to unit {unit.address} and refused ({refused}), and yet it turns: "
-            f"{seen}. It was not repeated",
-            unit=unit.address,
-            **commands.frames_of(refused),
-        ) from refused
+async def _start(unit: DriveView, jogs: bool, hz: float | None, reverse: bool, confirm: float, force: bool) -> None:
+    confirm = checks.number("confirm", confirm, 0.0, 3600.0)
+    force, reverse = checks.flag("force", force), checks.flag("reverse", reverse)
+    kind, told = await call_core(unit, lambda core: core.start(jogs, reverse, hz, confirm, force))
+    if kind != "done":
+        raise not_commanded.in_words(unit, *told, hz=hz or 0.0, confirm=confirm)
 
 
 async def _halt(unit: DriveView, command: str, confirm: float, within: float, *, coasts: bool = False) -> None:

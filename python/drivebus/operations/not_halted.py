@@ -7,9 +7,11 @@ from typing import Any
 
 from drivebus.errors import DrivebusError, NotAllowed, Refused, Unconfirmed
 from drivebus.identify.contradiction import in_words as contradiction
-from drivebus.operations import commands, state
+from drivebus.operations import glances
 from drivebus.operations.aim import profiles_of, undecided
 from drivebus.operations.drive_view import DriveView
+from drivebus.operations.said import MAY, said
+from drivebus.operations.seen import afterwards, frames_of
 from drivebus.values import ControlSource
 
 __all__ = ["in_words"]
@@ -42,7 +44,7 @@ def in_words(named: DriveView, unit: DriveView, command: str, found: float, reas
     elif reason == "port_lost":
         error, cause = _port_lost(unit, command, told, found), told
     elif reason == "unread":
-        error = _unshown(unit, command, f"its last answer: {told}; {state.seen_last(unit, found)}")
+        error = _unshown(unit, command, f"its last answer: {told}; {glances.seen_last(unit, found)}")
     else:
         error = _unshown(unit, command, _seen_last(unit, *told))
     error.__cause__ = cause
@@ -67,7 +69,7 @@ def _not_sent(named: DriveView, unit: DriveView, command: str, reason: str, told
 def _unsaid(unit: DriveView, command: str) -> DrivebusError:
     return Unconfirmed(
         f"unit {unit.address} is busy, and does not say what it is: {command} was not sent, for it may start "
-        f"a drive of another family; {commands.MAY[command]}, {state.seen_last(unit)}. If it must stop now, use the "
+        f"a drive of another family; {MAY[command]}, {glances.seen_last(unit)}. If it must stop now, use the "
         "emergency stop",
         unit=unit.address,
     )
@@ -75,7 +77,7 @@ def _unsaid(unit: DriveView, command: str) -> DrivebusError:
 
 def _not_out(unit: DriveView, command: str, error: DrivebusError) -> DrivebusError:
     return type(error)(
-        f"{commands.said(command)} could not be sent to unit {unit.address} ({error}); {commands.MAY[command]}",
+        f"{said(command)} could not be sent to unit {unit.address} ({error}); {MAY[command]}",
         unit=unit.address,
         request=error.request,
         ended=error.ended,
@@ -92,37 +94,37 @@ def _not_taken(
     told, took, heard = sent
     times = f"{len(told)} times within {took:.1f} s" if len(told) != 1 else "once"
     was_sent = f"{_each_once(told)} was sent to unit {unit.address} {times}"
-    shown = after if isinstance(after, Exception) else state.shown(unit, after)
-    afterwards = f"{commands.MAY[command]}. {commands.afterwards(unit, shown)}"
+    shown = after if isinstance(after, Exception) else glances.shown(unit, after)
+    then = f"{MAY[command]}. {afterwards(unit, shown)}"
     if isinstance(error, Refused):
         return Refused(
-            f"{was_sent} and not taken, at last: {error}; {afterwards}",
+            f"{was_sent} and not taken, at last: {error}; {then}",
             code=error.code,
             name=error.name,
             meaning=error.meaning,
             means=error.means,
             unit=unit.address,
-            **commands.frames_of(error),
+            **frames_of(error),
         )
     silent = "nothing came from it at all"
     if heard is not None:
         silent = f"the last that came from it came {heard:.1f} s ago"
     return Unconfirmed(
-        f"{was_sent} and not confirmed ({error}): {silent}; {afterwards}",
+        f"{was_sent} and not confirmed ({error}): {silent}; {then}",
         unit=unit.address,
-        **commands.frames_of(error),
+        **frames_of(error),
     )
 
 
 def _each_once(told: Iterable[str]) -> str:
-    return " or ".join(map(commands.said, dict.fromkeys(told)))
+    return " or ".join(map(said, dict.fromkeys(told)))
 
 
 def _unasked(unit: DriveView, command: str, error: DrivebusError) -> DrivebusError:
     return Unconfirmed(
-        f"{commands.said(command)} was sent to unit {unit.address} and taken, and what the unit "
+        f"{said(command)} was sent to unit {unit.address} and taken, and what the unit "
         f"is could not be asked ({error}): by another family it may mean something else; "
-        f"{commands.MAY[command]}; {state.seen_last(unit)}",
+        f"{MAY[command]}; {glances.seen_last(unit)}",
         unit=unit.address,
     )
 
@@ -136,29 +138,28 @@ def _another(
         return error, error.__cause__ if isinstance(error.__cause__, DrivebusError) else None
     what = str(error) if against is None else f"{contradiction(named.profile, unit.address, against)}, and {error}"
     return Unconfirmed(
-        f"{commands.said(command)} was sent to unit {unit.address} and taken; but {what}. {commands.MAY[command]}",
+        f"{said(command)} was sent to unit {unit.address} and taken; but {what}. {MAY[command]}",
         unit=unit.address,
     ), error
 
 
 def _port_lost(unit: DriveView, command: str, error: DrivebusError, found: float) -> DrivebusError:
     return Unconfirmed(
-        f"{commands.said(command)} was sent to unit {unit.address}; the port was lost before its state showed it "
-        f"({error}): {commands.MAY[command]}; {state.seen_last(unit, found)}",
+        f"{said(command)} was sent to unit {unit.address}; the port was lost before its state showed it "
+        f"({error}): {MAY[command]}; {glances.seen_last(unit, found)}",
         unit=unit.address,
     )
 
 
 def _unshown(unit: DriveView, command: str, last: str) -> DrivebusError:
     return Unconfirmed(
-        f"{commands.said(command)} was sent to unit {unit.address}, and its state does not show it: "
-        f"{commands.MAY[command]}; {last}",
+        f"{said(command)} was sent to unit {unit.address}, and its state does not show it: {MAY[command]}; {last}",
         unit=unit.address,
     )
 
 
 def _seen_last(unit: DriveView, told: Any, hz: float | None) -> str:
-    seen = state.shown(unit, told)
+    seen = glances.shown(unit, told)
     last = f"state seen last: {seen}"
     if hz is not None:
         last += f", at {hz:g} Hz"

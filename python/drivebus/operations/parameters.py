@@ -13,7 +13,7 @@ from typing import NamedTuple, overload
 from drivebus import checks
 from drivebus.advice import Advice, Text, argument, call, joined
 from drivebus.errors import BadArgument, DrivebusError, NotReady
-from drivebus.operations import parameter_writes, registers, state, unit_variants
+from drivebus.operations import glances, parameter_writes, registers, state, unit_variants
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.in_parts import counted
 from drivebus.operations.parameter_writes import Planned, key
@@ -222,7 +222,7 @@ async def check_now(unit: DriveView, planned: Sequence[Planned]) -> None:
     values = await registers.snapshot(unit, *names)
     if state_word is not None:
         now = state.state_of(unit, int(values[state_word]))
-        state.remember(unit, str(now))
+        glances.remember(unit, str(now))
         if now.running:
             raise NotReady(
                 f"{', '.join(only_stopped)} can be written only while the drive is stopped, and unit {unit.address} "

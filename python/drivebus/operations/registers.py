@@ -8,8 +8,9 @@ from typing import overload
 from drivebus.advice import Text
 from drivebus.errors import BadArgument
 from drivebus.line.asking import Read
-from drivebus.operations import raw_words, unit_variants
+from drivebus.operations import unit_variants
 from drivebus.operations.drive_view import DriveView
+from drivebus.operations.explained import explained
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.plan import labelled
@@ -61,7 +62,7 @@ async def snapshot(unit: DriveView, *names: str, verify: bool = False, unverifie
     answers: list[list[int]] = []
     started = ended = 0.0
     for place, count in plan.reads:
-        with raw_words.explained(unit):
+        with explained(unit):
             came, sent, ended = await unit.bus.ask_stamped(Read.at(unit.address, place, count, verify=verify))
         started = started if answers else sent
         answers.append(came)

@@ -7,24 +7,32 @@ before; the frequency, whose source a start depends on anyway, goes out at once.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
-from drivebus import checks
-from drivebus.errors import BadArgument
-from drivebus.operations import bus_control, parameter_writes, parameters, raw_words, registers, unit_variants
+from drivebus import _native, checks
+from drivebus.errors import BadArgument, DrivebusError, NotAllowed
+from drivebus.operations import (
+    bus_control,
+    not_written,
+    parameter_writes,
+    parameters,
+    registers,
+    unit_variants,
+)
+from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
-from drivebus.values import Value
 
 __all__ = [
     "SetpointRange",
     "check_setpoints",
+    "not_set",
     "read_setpoint",
     "register_of",
     "with_setpoint",
-    "word_of",
     "write_setpoint",
-    "write_word",
 ]
 
 
@@ -111,7 +119,7 @@ async def check_setpoints(unit: DriveView, low: float, high: float, *, unverifie
             f"setpoints from {low:g} to {high:g} Hz are none; give the lower one first", unit=unit.address
         )
     _counted(unit, low)
-    await word_of(unit, high)
+    await _asked_for(unit, high, lambda core: core.frequency_word(high))
     return SetpointRange(unit.address, low, high, unit.profile)
 
 
@@ -146,12 +154,13 @@ async def write_setpoint(
     """
     unit = unit.trusting(unverified)
     if checked is not None:
-        await write_word(_as_checked(unit, name, checked), checked.word_of(value))
+        await _write_word(_as_checked(unit, name, checked), checked.word_of(value))
+        return
+    if name == "frequency":
+        hz = checks.number("setpoint", value, 0.0)
+        await _asked_for(unit, hz, lambda core: core.set_frequency(hz))
         return
     unit = await with_setpoint(unit, name)
-    if name == "frequency":
-        await write_word(unit, await word_of(unit, value))
-        return
     register = register_of(unit, name)
     planned = parameters.plan_write(unit, register, checks.number(name, value, -math.inf), False)
     await bus_control.check_heeded(unit, name, register)
@@ -204,35 +213,53 @@ def _frequency_in_hz(unit: DriveView) -> str:
     register = register_of(unit, "frequency")
     counted_in = unit.profile.describe(register).unit
     if counted_in != "Hz":
-        raise BadArgument(
-            f"the setpoint of unit {unit.address} is in {counted_in or 'a unit that is not known'}, not in Hz; "
-            f'nothing was sent. write("{register}", …) takes it as it is',
-            unit=unit.address,
-        )
+        raise _not_in_hz(unit, register, counted_in)
     return register
 
 
-async def write_word(unit: DriveView, word: int) -> None:
+def _not_in_hz(unit: DriveView, register: str, counted_in: str) -> BadArgument:
+    return BadArgument(
+        f"the setpoint of unit {unit.address} is in {counted_in or 'a unit that is not known'}, not in Hz; "
+        f'nothing was sent. write("{register}", …) takes it as it is',
+        unit=unit.address,
+    )
+
+
+async def _write_word(unit: DriveView, word: int) -> None:
     """Writes the frequency, as the drive counts it."""
-    register = register_of(unit, "frequency")
-    read_back = unit.profile.read_back(register)
-    await raw_words.write(unit, unit.profile.address(register), word, read_back=read_back, absolute=True)
+    kind, told = await call_core(unit, lambda core: core.write_frequency(word))
+    if kind != "done":
+        raise not_written.in_words(unit, *told)
 
 
-async def word_of(unit: DriveView, hz: float) -> int:
-    """*hz* as the drive counts it, if that is no more than its own maximum."""
-    raw = _counted(unit, hz)
-    register = register_of(unit, "frequency")
-    limit = unit.profile.describe(register).high_from
-    if limit is not None and unit.evidence.unreadable(limit) is None:
-        highest: Value = await registers.read(unit, limit)
-        if hz > highest:
-            raise BadArgument(
-                f"setpoint {hz:g} Hz is above the drive's own maximum, {limit} = {highest:g} Hz; "
-                f"allowed is 0 to {highest:g} Hz. No setpoint was sent to unit {unit.address}",
-                unit=unit.address,
-            )
-    return raw
+async def _asked_for(unit: DriveView, hz: float, wanted: Callable[[_native.Unit], _native.Task]) -> None:
+    """Does what is *wanted* with *hz*. Raises the errors of a frequency that may not be given, or was not taken."""
+    kind, told = await call_core(unit, wanted)
+    if kind != "done":
+        raise not_set(unit, hz, *told)
+
+
+def not_set(unit: DriveView, hz: float, kind: str, told: Any) -> DrivebusError:
+    """Why *unit* was not given the frequency *hz*: as `_native.Unit.set_frequency` has it."""
+    if kind == "not_settled":
+        return unit_variants.not_settled(unit, *told)
+    if kind == "not_written":
+        return not_written.in_words(unit, *told)
+    if kind == "above":
+        limit, highest = told
+        return BadArgument(
+            f"setpoint {hz:g} Hz is above the drive's own maximum, {limit} = {highest:g} Hz; "
+            f"allowed is 0 to {highest:g} Hz. No setpoint was sent to unit {unit.address}",
+            unit=unit.address,
+        )
+    try:
+        register = register_of(unit, "frequency")
+        if kind == "not_in_hz":
+            return _not_in_hz(unit, register, told)
+        unit.evidence.require_writable(register)
+    except NotAllowed as error:
+        return error
+    raise RuntimeError(f"the frequency of {unit.profile.name} may be written")
 
 
 def _counted(unit: DriveView, hz: float) -> int:

@@ -6,45 +6,28 @@ reason is kept: half of a status is better than none.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
 
-from drivebus._native import Looks
 from drivebus.errors import BadArgument
 from drivebus.look import Look
-from drivebus.operations import events, raw_words, registers
+from drivebus.operations import registers
 from drivebus.operations.drive_view import DriveView
+from drivebus.operations.explained import read_words
+from drivebus.operations.glances import glance, planned, remember
 from drivebus.profile.evidence import Evidence
-from drivebus.profile.profile import native_of
 from drivebus.values import Fault, State, Status
 
 __all__ = [
     "fault",
     "fault_history",
-    "glance",
-    "keep",
     "look",
     "ping",
-    "planned",
     "read_off",
-    "remember",
-    "seen_last",
-    "shown",
     "state",
     "state_of",
     "state_word",
     "status",
 ]
-
-
-class _Plan(NamedTuple):
-    """What a look reads, worked out once for each profile and trust."""
-
-    looks: Looks
-    state: str | None
-    fault: str | None
-    missing: Mapping[str, str]
 
 
 async def look(unit: DriveView, *, urgent: bool = False, unverified: bool = False) -> Look:
@@ -61,29 +44,6 @@ async def look(unit: DriveView, *, urgent: bool = False, unverified: bool = Fals
     return seen
 
 
-async def glance(unit: DriveView, *, urgent: bool = False) -> Look:
-    """As `look`; where nothing may be read, nothing is, and nothing is told."""
-    plan = planned(unit.evidence)
-    if plan.looks.is_blind:
-        return Look(State.UNKNOWN, {}, None, 0.0, plan.missing, False, None)
-    seen = shown(unit, await raw_words.carried_out_of(unit, plan.looks.look(unit.address, urgent)))
-    keep(unit, seen)
-    return seen
-
-
-def shown(unit: DriveView, told: Any) -> Look:
-    """What a look at *unit* showed, of which the core *told*."""
-    doing, word, number, in_fault, fields, asked = told
-    fault = unit.profile.fault(number) if number else None
-    return Look(State(doing), dict(fields), fault, asked, planned(unit.evidence).missing, in_fault, word)
-
-
-def keep(unit: DriveView, seen: Look) -> None:
-    """Keeps what was *seen*, and tells what changed since the look before."""
-    remember(unit, str(seen))
-    events.saw(unit, seen.state, str(seen.fault or "not named") if seen.tripped else None)
-
-
 async def state(unit: DriveView, *, unverified: bool = False) -> State:
     """What the drive is doing: one read of its state word.
 
@@ -91,7 +51,7 @@ async def state(unit: DriveView, *, unverified: bool = False) -> State:
         NotAllowed: The family has no state word that is known, or verified. Nothing was sent.
     """
     unit = unit.trusting(unverified)
-    [word] = await raw_words.read_words(unit, unit.profile.address(state_word(unit, "telling the state")))
+    [word] = await read_words(unit, unit.profile.address(state_word(unit, "telling the state")))
     seen = state_of(unit, word)
     remember(unit, str(seen))
     return seen
@@ -109,21 +69,9 @@ async def ping(unit: DriveView) -> None:
     roles = [unit.profile.role("state"), unit.profile.role("fault")]
     named = [*roles, *unit.profile.monitor_names(), *unit.profile.names()]
     for name in unit.evidence.readable(name for name in named if name is not None):
-        await raw_words.read_words(unit, unit.profile.address(name))
+        await read_words(unit, unit.profile.address(name))
         return
     raise BadArgument(f"nothing is known that {unit.profile.title} answers, so unit {unit.address} was not asked")
-
-
-def planned(evidence: Evidence) -> _Plan:
-    """What a look reads at a unit of whose family that is known."""
-    return evidence.cached(_plan)
-
-
-def _plan(evidence: Evidence) -> _Plan:
-    reasons = {"state": evidence.without_state(), "fault": evidence.without_fault()}
-    looks = Looks(native_of(evidence.profile), evidence.unverified)
-    missing = {what: reason for what, reason in reasons.items() if reason is not None}
-    return _Plan(looks, looks.state, looks.fault, missing)
 
 
 async def status(unit: DriveView, *, unverified: bool = False) -> Status:
@@ -235,18 +183,3 @@ def state_of(unit: DriveView, word: int) -> State:
         return State(unit.profile.state(word))
     except ValueError:
         return State.UNKNOWN
-
-
-def remember(unit: DriveView, seen: str) -> None:
-    """Keeps the last state that was seen, for errors after which none can be read."""
-    unit.record.last_state = (seen, unit.bus.now())
-
-
-def seen_last(unit: DriveView, now: float | None = None) -> str:
-    """The last state that was seen, and how long ago on the line's clock: before *now*, if that is given."""
-    if unit.record.last_state is None:
-        return "no state was ever seen"
-    seen, at = unit.record.last_state
-    # A line that is lost may have no clock.
-    age = max((unit.bus.now() if now is None else now) - at, 0.0)
-    return f"state seen last, {age:.1f} s ago: {seen}"

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Set
+from typing import Any
 
 from drivebus.advice import Advice, Text
-from drivebus.errors import NotReady
+from drivebus.errors import DrivebusError, NotAllowed, NotReady
+from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
-from drivebus.operations.raw_words import read_words
 from drivebus.profile.evidence import Evidence, not_verified
 from drivebus.profile.facts import Variant
 
-__all__ = ["is_open", "rules", "settled", "undecided"]
+__all__ = ["given", "is_open", "not_settled", "rules", "settled", "undecided"]
 
 
 def rules(unit: DriveView) -> Mapping[str, Variant]:
@@ -34,11 +35,12 @@ async def settled(unit: DriveView, *names: str) -> DriveView:
     still_open = unit.evidence.cached(undecided)
     if not still_open:
         return unit
-    wanted = [known.variant for name in names if (known := unit.profile.describe(name)).variant]
-    chosen = {variant: await _chosen(unit, variant) for variant in wanted if variant in still_open}
-    if not chosen:
+    if all(unit.profile.describe(name).variant not in still_open for name in names):
         return unit
-    return unit.with_profile(unit.profile.with_variants({**unit.profile.variants_chosen, **chosen}))
+    kind, told = await call_core(unit, lambda core: core.settled(names))
+    if kind != "done":
+        raise not_settled(unit, *told)
+    return unit.with_profile(unit.profile.with_variants(told))
 
 
 def given(unit: DriveView, variant: str) -> Text:
@@ -47,31 +49,33 @@ def given(unit: DriveView, variant: str) -> Text:
     return Text(Advice("variants", variant, f"variants={{{variant!r}: …}} for bus.drive()"), f" ({choices})")
 
 
-async def _chosen(unit: DriveView, variant: str) -> str:
-    """What the drive's own parameter says of *variant*."""
-    rule = rules(unit)[variant]
-    parameter, choices = rule.parameter, rule.choices
+def not_settled(unit: DriveView, kind: str, told: Any) -> DrivebusError:
+    """Why nobody knows what words of *unit* mean: *kind* and *told* as `_native.Unit.settled` has them."""
+    variant = told[0] if kind == "unknown" else told
+    parameter = rules(unit)[variant].parameter
     says = Text(given(unit, variant), " says which")
-    reason = unit.evidence.undecided(variant)
-    if reason is not None:
-        raise not_verified(
+    if kind == "unproved":
+        reason = unit.evidence.undecided(variant) or ""
+        return not_verified(
             f"what {parameter} decides in {unit.profile.title}, and so what the word means (its {variant})",
             Text(f"{reason.rstrip('.')}; ", says),
             unit.address,
         )
-    unit.evidence.require_readable([parameter])
-    known = unit.profile.describe(parameter)
-    raw = known.number(await read_words(unit, unit.profile.address(parameter), known.words))
-    for choice, value in choices.items():
-        if value == raw:
-            return str(choice)
-    raise NotReady(
-        Text(
-            f"{parameter} of unit {unit.address} is {raw}, which means nothing known; ", says, ". Nothing was written"
-        ),
-        why="settings",
-        unit=unit.address,
-    )
+    if kind == "unknown":
+        return NotReady(
+            Text(
+                f"{parameter} of unit {unit.address} is {told[1]}, which means nothing known; ",
+                says,
+                ". Nothing was written",
+            ),
+            why="settings",
+            unit=unit.address,
+        )
+    try:
+        unit.evidence.require_readable([parameter])
+    except NotAllowed as error:
+        return error
+    raise RuntimeError(f"{parameter} of {unit.profile.name} may be read")
 
 
 def _rules(evidence: Evidence) -> Mapping[str, Variant]:

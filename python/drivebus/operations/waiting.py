@@ -8,8 +8,8 @@ from drivebus import checks
 from drivebus.errors import BadArgument, NotReached, Unconfirmed
 from drivebus.look import STANDSTILL
 from drivebus.operations import state
-from drivebus.operations.commands import POLL_INTERVAL
 from drivebus.operations.drive_view import DriveView
+from drivebus.operations.glances import POLL_INTERVAL
 from drivebus.values import State, Status
 
 __all__ = ["check_standstill", "wait_for_speed", "wait_until_stopped"]

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from drivebus import checks
-from drivebus.operations import state
+from drivebus.operations import glances
 from drivebus.profile.evidence import Evidence
 from drivebus.service.dispatch import Dispatch
 from drivebus.service.events import Events
@@ -84,7 +84,7 @@ def drive_of(drive: SiteDrive, polls: tuple[SitePoll, ...], may: frozenset[str])
     names = dict.fromkeys(name for layout in layouts for name in layout.names)
     values = tuple(_value(evidence, name) for name in names)
     maker, _, model = profile.title.partition(" ")
-    tells = state.planned(evidence)
+    tells = glances.planned(evidence)
     highest, step = _setpoints(evidence)
     in_force = profile.role("setpoint") or ""
     return MqttDrive(

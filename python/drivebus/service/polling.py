@@ -11,7 +11,7 @@ from typing import Any
 from drivebus.bus import Bus
 from drivebus.drive import Drive
 from drivebus.line.poll_samples import Sample
-from drivebus.operations import state
+from drivebus.operations import glances, state
 from drivebus.operations.drive_base import unit_of
 from drivebus.operations.registers import monitored
 from drivebus.poll import Poll
@@ -98,7 +98,7 @@ class _Series:
 
     def __init__(self, name: str, drive: Drive, poll: SitePoll) -> None:
         self._unit = unit_of(drive)
-        self._told = state.planned(self._unit.evidence)
+        self._told = glances.planned(self._unit.evidence)
         self.layout = layout_of(name, self._unit.evidence, poll.registers)
         # The sample nearest to the heartbeat: none comes on time to the microsecond.
         heartbeat = poll.heartbeat - poll.interval / 2
@@ -118,7 +118,7 @@ class _Series:
 
 def layout_of(name: str, evidence: Evidence, registers: Sequence[str]) -> Layout:
     """What the samples of the drive *name* have, which is asked for *registers*, or for what its family has to tell."""
-    told, profile = state.planned(evidence), evidence.profile
+    told, profile = glances.planned(evidence), evidence.profile
     asked = [*(registers or monitored(evidence)), told.state, told.fault]
     names = tuple(dict.fromkeys(each for each in asked if each is not None))
     rows = [profile.describe(each) for each in names]
