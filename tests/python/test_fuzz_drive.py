@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fuzz.drive import drive
 
-from drivebus.operations import commands, parameter_writes
+from drivebus.operations import core_calls, motion, parameter_writes
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.halting import Halt
 
@@ -26,10 +27,10 @@ def test_the_corpus_is_there() -> None:
     assert len(FILES) >= 10
 
 
-def _sent_twice(send: Callable[..., object]) -> Callable[..., object]:
-    async def twice(unit: object, name: str, *rest: object) -> None:
-        await send(unit, name, *rest)  # type: ignore[misc]
-        await send(unit, name, *rest)  # type: ignore[misc]
+def _done_twice(do: Callable[..., Awaitable[tuple[str, Any]]]) -> Callable[..., Awaitable[tuple[str, Any]]]:
+    async def twice(unit: object, wanted: object) -> tuple[str, Any]:
+        await do(unit, wanted)
+        return await do(unit, wanted)
 
     return twice
 
@@ -44,7 +45,7 @@ def found() -> Iterator[str]:
 
 
 def test_a_command_that_goes_out_twice_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(commands, "send", _sent_twice(commands.send))
+    monkeypatch.setattr(motion, "call_core", _done_twice(core_calls.call_core))
     assert any("a command went out twice" in said for said in found())
 
 

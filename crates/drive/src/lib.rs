@@ -60,7 +60,7 @@
 //! | `speed` | how fast a motor turns, and how its drive slows it down |
 //! | `taken`, `unit` | a unit as the family that it is taken for, and as one call sees it |
 //! | `settled` | what a parameter of the drive decides of the meaning of its words |
-//! | `settings` | whether the drive is set to obey the bus |
+//! | `wanted`, `settings` | what must be set in a drive so that it obeys the bus, and whether it is |
 //! | `writing` | one write to a unit that still is what it was |
 //! | `setpoint` | the frequency that a drive is to run at |
 //! | `ready` | what is looked at before a motor is started |
@@ -99,6 +99,7 @@ mod speed;
 mod taken;
 pub mod task;
 mod unit;
+mod wanted;
 mod writing;
 
 pub use aim::{ANSWER_WITHIN, Aim, NotTaken, Target, check_harmless, goes_out_at_once};

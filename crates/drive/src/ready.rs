@@ -6,9 +6,10 @@ use drivebus_drives::{Command, Control, Setpoint, State};
 use thiserror::Error;
 
 use crate::look::Look;
-use crate::settings::{Setting, needs_of, wanted_always, wanted_of_commands};
+use crate::settings::Setting;
 use crate::task::{LineError, Link, Mailbox};
 use crate::unit::Unit;
+use crate::wanted::{needs_of, wanted_always, wanted_of_commands};
 
 /// Of the last ten exchanges with a unit. One answer in ten may be lost on a line that works, to a burst of noise. Where two
 /// are, the next may be the one that stops the motor.

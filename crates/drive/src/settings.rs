@@ -1,12 +1,12 @@
 //! Whether a drive is set to obey the bus, and to heed what the bus tells it.
 
-use std::collections::BTreeSet;
 use std::fmt;
 
-use drivebus_drives::{Control, Entry, Profile, Setpoint, Value};
+use drivebus_drives::{Control, Entry, Setpoint, Value};
 
 use crate::task::{LineError, Mailbox};
 use crate::unit::Unit;
+use crate::wanted::{needs_of, wanted_for, wanted_of_commands};
 
 /// A parameter that must have a certain value, and what it has.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,31 +38,6 @@ impl fmt::Display for Setting {
             None => write!(f, "{code} must be {raw} ({label}), and may not be read"),
         }
     }
-}
-
-/// What must be set in any case, or the words of the profile are not where it has them.
-pub(crate) fn wanted_always(profile: &Profile) -> Vec<Control> {
-    profile.control().iter().filter(|row| row.always).cloned().collect()
-}
-
-/// What must be set for commands alone, whatever the setpoints.
-pub(crate) fn wanted_of_commands(profile: &Profile) -> Vec<Control> {
-    let of_setpoints: BTreeSet<_> =
-        profile.setpoints().values().flat_map(|role| &role.needs).map(|row| row.code.as_str()).collect();
-    profile.control().iter().filter(|row| !of_setpoints.contains(row.code.as_str())).cloned().collect()
-}
-
-/// What must be set for `setpoint` alone.
-pub(crate) fn needs_of(profile: &Profile, setpoint: Setpoint) -> &[Control] {
-    profile.setpoints().get(&setpoint).map_or(&[], |role| &role.needs)
-}
-
-/// What must be set so that only the bus commands the drive and gives it `setpoint`, in the order in which to set it.
-pub(crate) fn wanted_for(profile: &Profile, setpoint: Setpoint) -> Vec<&Control> {
-    let needs = needs_of(profile, setpoint);
-    let told = needs_of(profile, Setpoint::Frequency).iter().chain(needs);
-    let of_setpoints: BTreeSet<_> = told.map(|row| row.code.as_str()).collect();
-    profile.control().iter().filter(|row| !of_setpoints.contains(row.code.as_str())).chain(needs).collect()
 }
 
 impl Unit {

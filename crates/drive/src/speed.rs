@@ -6,8 +6,8 @@ use drivebus_drives::{Entry, Profile, ReadPlan, Setpoint, State};
 use drivebus_rtu::UnitAddress;
 
 use crate::rule::Rule;
-use crate::settings::wanted_for;
 use crate::task::{Cause, LineError, Mailbox, Read};
+use crate::wanted::wanted_for;
 
 /// Output frequency in Hz up to which a drive that has stopped counts as stopped.
 pub const STANDSTILL: f64 = 0.05;

@@ -12,9 +12,9 @@ use crate::clock::{duration, moment, to_seconds};
 use crate::errors::refuse;
 use crate::family::{against, names};
 use crate::look::Looks;
+use crate::not_done::{after as after_of, last_look};
 use crate::record::Record;
 use crate::same_unit::SameUnit;
-use crate::shown_look::{after as after_of, last_look};
 use crate::task::{Failed, Task, unknown};
 
 type Core = drive::Halt<Failed>;

@@ -1,8 +1,8 @@
 //! Why something was not done to a unit, for Python: of which kind the reason is, and what of it Python words.
 
 use drivebus_drive::{
-    Ignores, NotCommanded, NotLedUp, NotReady, NotSame, NotSet, NotSettled, NotTaken, NotTold, NotWritten,
-    WhyNotCommanded, WhyNotLedUp,
+    After, Ignores, LastLook, NotCommanded, NotLedUp, NotReady, NotSame, NotSet, NotSettled, NotTaken, NotTold,
+    NotWritten, Setting, WhyNotCommanded, WhyNotLedUp,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -11,9 +11,8 @@ use crate::aim::not_taken;
 use crate::clock::to_seconds;
 use crate::errors::refuse;
 use crate::same_unit::checked;
-use crate::shown_look::{after as after_of, last_look, shown};
+use crate::shown_look::shown;
 use crate::task::{Failed, unknown};
-use crate::unit::setting;
 
 /// A kind, and what is told of it.
 pub(crate) type Told = (&'static str, Py<PyAny>);
@@ -56,7 +55,7 @@ fn why_not_commanded(py: Python<'_>, why: WhyNotCommanded<Failed>) -> PyResult<T
             ("halted_between", error.map(|error| raised(py, error)).transpose()?.into_py_any(py)?)
         }
         Why::NotWritten(why) => ("not_written", written_told(py, why)?.into_py_any(py)?),
-        Why::Unanswered { last, after } => ("unanswered", (raised(py, last)?, after_of(py, after)?).into_py_any(py)?),
+        Why::Unanswered { last, after: then } => ("unanswered", (raised(py, last)?, after(py, then)?).into_py_any(py)?),
         Why::RefusedAndTurns { last, look } => ("refused_and_turns", (raised(py, last)?, shown(look)).into_py_any(py)?),
         Why::PortLost(error) => ("port_lost", raised(py, error)?),
         Why::Unshown(last) => last_look(py, last)?,
@@ -138,5 +137,28 @@ fn led_up_told(py: Python<'_>, why: WhyNotLedUp<Failed>) -> PyResult<Told> {
         WhyNotLedUp::PortLost(error) => ("port_lost", raised(py, error)?),
         WhyNotLedUp::Unshown(last) => last_look(py, last)?,
         why => return Err(unknown(&why)),
+    })
+}
+
+/// A setting: its code, the word it must hold and the one it holds, label, note, and whether it is verified and set by hand.
+pub(crate) fn setting(setting: Setting) -> (String, u16, Option<i64>, String, String, bool, bool) {
+    let actual = setting.actual.map(drivebus_drives::Value::count);
+    let wanted = setting.wanted;
+    (wanted.code, wanted.raw, actual, wanted.label, wanted.note, wanted.verified, wanted.by_hand)
+}
+
+/// A look after something came to nothing, or the exception instead of one.
+pub(crate) fn after(py: Python<'_>, after: After<Failed>) -> PyResult<Py<PyAny>> {
+    match after {
+        After::Seen(look) => shown(look).into_py_any(py),
+        After::Unread(error) => PyErr::from(error).into_value(py).into_py_any(py),
+    }
+}
+
+/// The last look at a unit: `"unshown"`, what it showed and the frequency, or `"unread"` and the exception.
+pub(crate) fn last_look(py: Python<'_>, last: LastLook<Failed>) -> PyResult<(&'static str, Py<PyAny>)> {
+    Ok(match last {
+        LastLook::Seen { look, hz } => ("unshown", (shown(look), hz).into_py_any(py)?),
+        LastLook::Unread(error) => ("unread", PyErr::from(error).into_value(py).into_py_any(py)?),
     })
 }

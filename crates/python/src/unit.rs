@@ -10,7 +10,7 @@ use crate::clock::duration;
 use crate::convert::place_of;
 use crate::errors::bad_argument;
 use crate::look::Looks;
-use crate::not_done::{not_commanded, not_ready, not_set, not_settled, not_written};
+use crate::not_done::{not_commanded, not_ready, not_set, not_settled, not_written, setting};
 use crate::record::Record;
 use crate::same_unit::SameUnit;
 use crate::task::{Failed, Task};
@@ -172,11 +172,4 @@ fn is_done<'py>(py: Python<'py>, value: impl IntoPyObject<'py>) -> PyResult<Py<P
 
 fn settings(py: Python<'_>, done: Result<Vec<Setting>, Failed>) -> PyResult<Py<PyAny>> {
     is_done(py, done?.into_iter().map(setting).collect::<Vec<_>>())
-}
-
-/// A setting: its code, the word it must hold and the one it holds, label, note, and whether it is verified and set by hand.
-pub(crate) fn setting(setting: Setting) -> (String, u16, Option<i64>, String, String, bool, bool) {
-    let actual = setting.actual.map(drivebus_drives::Value::count);
-    let wanted = setting.wanted;
-    (wanted.code, wanted.raw, actual, wanted.label, wanted.note, wanted.verified, wanted.by_hand)
 }
