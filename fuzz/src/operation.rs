@@ -1,19 +1,22 @@
 //! Invariant: whatever comes of its wishes, an operation of the core ends soon after. One that identifies, or looks whether
 //! a unit is what it was, writes nothing. A halt writes only what halts in the words of the family that the unit is taken
 //! for, tells whether any of it went out, and is proved by nothing but a confirmation and a look that does not show the
-//! motor running, or, of a stop, slowing down. What does not fit a wish changes nothing.
+//! motor running, or, of a stop, slowing down. A start and a reset write nothing but their own words, the command once at most
+//! and only behind a look that shows no reason against it, and never where the unit was told to halt since; they tell whether
+//! the motor may turn. What does not fit a wish changes nothing.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_drive::task::{
-    Cause, LineError, Misuse, Notice, Outcome, Payload, Read, Seen, Stamped, Step, Task, Wish, Write,
+    Cause, LineError, Link, Misuse, Notice, Outcome, Payload, Read, Seen, Stamped, Step, Task, Wish, Write,
 };
 use drivebus_drive::{
-    Families, Family, HALTS, Halt, Identity, Looks, NotHalted, Order, Record, SameUnit, Speeds, Taken, identify,
+    Families, Family, HALTS, Halt, Identity, Looks, NotCommanded, NotHalted, Order, Record, SameUnit, Speeds, Start,
+    Taken, Unit, identify,
 };
-use drivebus_drives::{Command, Place, State};
+use drivebus_drives::{Command, Entry, Place, StartWord, State};
 use drivebus_rtu::{ExceptionCode, Instant, Meaning, UnitAddress};
 
 use crate::stream::Input;
@@ -64,6 +67,10 @@ pub fn operation(data: &[u8]) {
     let identity = Identity::new(0);
     let same = SameUnit::new(unit, named, &identity, kind & 0x80 != 0);
     let mut line = Line::new(input);
+    if kind & 0x40 != 0 {
+        command(&mut line, same, kind, confirm);
+        return;
+    }
     match kind & 0x07 {
         0 => drop(line.carry_out(Task::new(async move |line| identify(&line, families, unit).await))),
         1 => drop(line.carry_out(Task::new(async move |line| same.check(&line, families, true, false).await))),
@@ -105,6 +112,70 @@ fn halt(line: &mut Line<'_>, named: &Arc<Family>, same: SameUnit, order: Order) 
     }
 }
 
+/// Starts the unit that is named so, or resets a fault.
+fn command(line: &mut Line<'_>, same: SameUnit, kind: u8, confirm: Duration) {
+    let (families, profile, record) = (Families::shipped(), Arc::clone(same.family().profile()), Record::default());
+    let (looks, speeds) = (Arc::new(Looks::new(&profile, true)), Arc::new(Speeds::new(&profile, true)));
+    let is_blind = looks.is_blind();
+    let unit = Unit::new(Taken::as_named(same, &looks, &speeds), &record);
+    let (is_reset, is_reverse) = (kind & 0x07 == 7, kind & 0x01 != 0);
+    let hz = (kind & 0x04 != 0).then(|| f64::from(line.input.byte()));
+    let mut start = if kind & 0x02 != 0 { Start::jog(is_reverse) } else { Start::run(is_reverse, hz) };
+    (start.confirm, start.is_forced) = (confirm, kind & 0x08 != 0);
+    let command = if is_reset { Command::ResetFault } else { start.command() };
+    let own = profile.command(command);
+    let first = profile.command_first(command);
+    let frequency = profile.role("setpoints.frequency").and_then(Entry::place);
+    line.commands =
+        Some(Commands { own, first, frequency, leads: profile.start_sequence().to_vec(), given: 0, acted: false });
+    let done: Result<(), NotCommanded<Fault>> = line.carry_out(Task::new(async move |line| match is_reset {
+        true => unit.reset_fault(&line, families, confirm).await,
+        false => unit.start(&line, families, &start).await,
+    }));
+    let Some(commands) = line.commands.take() else { unreachable!("it was there") };
+    assert!(commands.given <= 1, "it was sent {} times", commands.given);
+    match done {
+        Ok(()) if is_reset => {}
+        Ok(()) => {
+            assert!(commands.acted, "it is said to be started, and nothing was taken");
+            assert_eq!(record.sent().starts, 1);
+            assert!(confirm.is_zero() || is_blind || line.looks > 1, "it is proved by nothing");
+        }
+        Err(error) => {
+            assert!(error.why.may_have_acted() || !commands.acted, "{error}");
+            assert!(!error.to_string().is_empty());
+        }
+    }
+}
+
+/// What a start or a reset may write, and what became of it.
+struct Commands {
+    own: Option<(Place, u16)>,
+    first: Option<(Place, u16)>,
+    frequency: Option<Place>,
+    leads: Vec<StartWord>,
+    /// How often the command went out.
+    given: usize,
+    /// Whether the unit may have taken it.
+    acted: bool,
+}
+
+impl Commands {
+    /// Whether `write` is the command itself. It is one of the words that belong to it, in any case.
+    fn is_own(&self, write: &Write) -> bool {
+        let words = match &write.payload {
+            Payload::Word(word) => vec![*word],
+            Payload::Words(words) => words.clone(),
+        };
+        let at = |(place, word): (Place, u16)| write.place == place && words.first() == Some(&word);
+        let is_own = self.own.is_some_and(at);
+        let is_lead = self.own.is_some_and(|(place, _)| self.leads.iter().any(|lead| at((place, lead.word))));
+        let is_frequency = self.frequency == Some(write.place) && words.len() == 1;
+        assert!(is_own || is_lead || is_frequency || self.first.is_some_and(at), "{write} is no part of it");
+        is_own
+    }
+}
+
 /// A line of which nothing can be relied on but that its clock goes on.
 struct Line<'i> {
     input: Input<'i>,
@@ -120,6 +191,11 @@ struct Line<'i> {
     looks: usize,
     /// What the last look showed.
     runs: bool,
+    is_tripped: bool,
+    /// How often the unit was told to halt, by somebody else.
+    halts: u64,
+    /// What a start or a reset may write; a halt may write what halts.
+    commands: Option<Commands>,
 }
 
 impl<'i> Line<'i> {
@@ -136,6 +212,9 @@ impl<'i> Line<'i> {
             went_out: false,
             looks: 0,
             runs: false,
+            is_tripped: false,
+            halts: 0,
+            commands: None,
         }
     }
 
@@ -171,6 +250,7 @@ impl<'i> Line<'i> {
             Wish::Tell(notice) => {
                 if let Notice::Saw(look) = notice {
                     self.looks += 1;
+                    self.is_tripped = look.is_tripped();
                     self.runs = look.state.is_running() || look.state == State::Unknown && self.runs;
                 }
                 Outcome::Heard
@@ -180,6 +260,11 @@ impl<'i> Line<'i> {
                 let Some(family) = family else { unreachable!("{write}, and nobody says in whose words") };
                 self.write(write, family).map_or_else(Outcome::Failed, |()| Outcome::Written)
             }
+            Wish::Link(_) => {
+                let good = u32::from(self.input.byte() % 11);
+                Outcome::Link(Link { good, asked: 10 })
+            }
+            Wish::Halts(_) => Outcome::Halts(Some(self.halts)),
             wish => unreachable!("{wish}"),
         }
     }
@@ -222,6 +307,9 @@ impl<'i> Line<'i> {
     }
 
     fn write(&mut self, write: &Write, family: &Family) -> Result<(), Fault> {
+        if self.commands.is_some() {
+            return self.command(write, family);
+        }
         self.written += 1;
         let word = match &write.payload {
             Payload::Word(word) => Some(*word),
@@ -245,6 +333,28 @@ impl<'i> Line<'i> {
         };
         self.taken += usize::from(is_taken);
         self.went_out |= came.as_ref().map_or_else(LineError::was_sent, |()| true);
+        came
+    }
+
+    /// What becomes of a write of a start or a reset. Now and then the unit is told to halt before.
+    fn command(&mut self, write: &Write, family: &Family) -> Result<(), Fault> {
+        let Some(commands) = &mut self.commands else { unreachable!("it was there") };
+        let is_own = commands.is_own(write);
+        let is_reset = family.profile().command(Command::ResetFault) == commands.own;
+        assert!(!write.is_urgent && write.halts.is_some() && write.connection.is_some(), "{write}");
+        self.halts += u64::from(self.input.byte() == 0xFF);
+        if write.halts != Some(self.halts) {
+            return Err(Fault { cause: Cause::Halted, raw: Vec::new(), was_sent: false });
+        }
+        assert!(!is_own || is_reset || !self.is_tripped, "it is started in fault");
+        let came = self.fate(true).map(drop);
+        let went_out = came.as_ref().map_or_else(LineError::was_sent, |()| true);
+        let is_refused = matches!(&came, Err(Fault { cause: Cause::Refused(code, _), .. })
+            if family.meaning_of(*code) != Meaning::Taken);
+        if let Some(commands) = self.commands.as_mut().filter(|_| is_own) {
+            commands.given += usize::from(went_out);
+            commands.acted |= went_out && !is_refused;
+        }
         came
     }
 

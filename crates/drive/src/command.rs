@@ -120,7 +120,7 @@ impl Unit {
         match self.ignores_commands(line).await {
             Ok(wrong) if wrong.is_empty() => Err(not_reset(found, why)),
             Ok(wrong) => Err(not_reset(found, Why::Ignored(wrong))),
-            Err(error) => Err(not_reset(found, Why::Failed(error))),
+            Err(error) => Err(not_reset(found, Why::Unseen(error))),
         }
     }
 

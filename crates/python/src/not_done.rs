@@ -60,7 +60,7 @@ fn why_not_commanded(py: Python<'_>, why: WhyNotCommanded<Failed>) -> PyResult<T
         Why::PortLost(error) => ("port_lost", raised(py, error)?),
         Why::Unshown(last) => last_look(py, last)?,
         Why::Ignored(wrong) => ("ignored", wrong.into_iter().map(setting).collect::<Vec<_>>().into_py_any(py)?),
-        Why::Failed(error) => return Err(error.into()),
+        Why::Failed(error) | Why::Unseen(error) => return Err(error.into()),
         why => return Err(unknown(&why)),
     })
 }

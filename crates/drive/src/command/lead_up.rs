@@ -44,7 +44,7 @@ impl Unit {
             }
             self.see(line, word, halts, within).await.map_err(|why| match why {
                 NotSeen::LedUp(why) => not_led_up(why),
-                NotSeen::Failed(error) => Why::Failed(error),
+                NotSeen::Failed(error) => Why::Unseen(error),
             })?;
         }
         Ok(())

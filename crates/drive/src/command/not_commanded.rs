@@ -82,6 +82,9 @@ pub enum WhyNotCommanded<E> {
     /// It was taken and not shown, for the drive does not take commands from the bus.
     #[error("it was taken and not shown, for the drive does not take commands from the bus: {}", told(.0))]
     Ignored(Vec<Setting>),
+    /// It was sent, and what it came to could not be looked at, for a reason that says nothing of the unit.
+    #[error("it was sent, and could not be looked at: {0}")]
+    Unseen(E),
     /// Something was not done, for a reason that says nothing of the unit; or a read failed before anything was sent.
     #[error("{0}")]
     Failed(E),
@@ -139,17 +142,18 @@ impl<E: LineError> WhyNotCommanded<E> {
             | Self::RefusedAndTurns { .. }
             | Self::PortLost(_)
             | Self::Unshown(_)
-            | Self::Ignored(_) => true,
+            | Self::Ignored(_)
+            | Self::Unseen(_) => true,
             Self::NotLedUp(NotLedUp { number, why }) => *number > 0 || !matches!(why, WhyNotLedUp::HaltedBefore(_)),
             Self::NotWritten(why) => why.was_sent() && !why.cause().is_refusal(),
             Self::NotReady(_) | Self::NotSet(_) | Self::Halted(_) | Self::Failed(_) => false,
         }
     }
 
-    /// As `Failed`, where what failed is no look that the unit did not answer.
+    /// As `Unseen`, where what failed is no look that the unit did not answer.
     pub(super) fn unless_of_the_unit(error: E) -> Result<E, Self> {
         match error.cause() {
-            Cause::Other | Cause::Halted => Err(Self::Failed(error)),
+            Cause::Other | Cause::Halted => Err(Self::Unseen(error)),
             _ => Ok(error),
         }
     }

@@ -121,7 +121,7 @@ impl Unit {
         }
         let deadline = line.now() + within;
         while !self.is_shown(line, shown, deadline).await? {
-            line.sleep(POLL_INTERVAL).await.map_err(Why::Failed)?;
+            line.sleep(POLL_INTERVAL).await.map_err(Why::Unseen)?;
         }
         Ok(())
     }
@@ -140,7 +140,7 @@ impl Unit {
             }
             Err(error) => match error.cause() {
                 Cause::Port => return Err(Why::PortLost(error)),
-                Cause::Other | Cause::Halted => return Err(Why::Failed(error)),
+                Cause::Other | Cause::Halted => return Err(Why::Unseen(error)),
                 // A refusal here is one of a read: it says nothing about the command.
                 Cause::NoAnswer | Cause::BadAnswer | Cause::Refused(..) => (LastLook::Unread(error), false, line.now()),
             },
