@@ -126,11 +126,21 @@ fn command(line: &mut Line<'_>, same: SameUnit, kind: u8, confirm: Duration) {
     let own = profile.command(command);
     let first = profile.command_first(command);
     let frequency = profile.role("setpoints.frequency").and_then(Entry::place);
-    line.commands =
-        Some(Commands { own, first, frequency, leads: profile.start_sequence().to_vec(), given: 0, acted: false });
-    let done: Result<(), NotCommanded<Fault>> = line.carry_out(Task::new(async move |line| match is_reset {
-        true => unit.reset_fault(&line, families, confirm).await,
-        false => unit.start(&line, families, &start).await,
+    line.commands = Some(Commands {
+        own,
+        first,
+        frequency,
+        leads: profile.start_sequence().to_vec(),
+        given: 0,
+        acted: false,
+        is_tripped: false,
+    });
+    let done: Result<(), NotCommanded<Fault>> = line.carry_out(Task::new(async move |line| {
+        if is_reset {
+            unit.reset_fault(&line, families, confirm).await
+        } else {
+            unit.start(&line, families, &start).await
+        }
     }));
     let Some(commands) = line.commands.take() else { unreachable!("it was there") };
     assert!(commands.given <= 1, "it was sent {} times", commands.given);
@@ -158,6 +168,8 @@ struct Commands {
     given: usize,
     /// Whether the unit may have taken it.
     acted: bool,
+    /// Whether the last look showed a fault.
+    is_tripped: bool,
 }
 
 impl Commands {
@@ -191,7 +203,6 @@ struct Line<'i> {
     looks: usize,
     /// What the last look showed.
     runs: bool,
-    is_tripped: bool,
     /// How often the unit was told to halt, by somebody else.
     halts: u64,
     /// What a start or a reset may write; a halt may write what halts.
@@ -212,7 +223,6 @@ impl<'i> Line<'i> {
             went_out: false,
             looks: 0,
             runs: false,
-            is_tripped: false,
             halts: 0,
             commands: None,
         }
@@ -250,7 +260,9 @@ impl<'i> Line<'i> {
             Wish::Tell(notice) => {
                 if let Notice::Saw(look) = notice {
                     self.looks += 1;
-                    self.is_tripped = look.is_tripped();
+                    if let Some(commands) = &mut self.commands {
+                        commands.is_tripped = look.is_tripped();
+                    }
                     self.runs = look.state.is_running() || look.state == State::Unknown && self.runs;
                 }
                 Outcome::Heard
@@ -341,12 +353,12 @@ impl<'i> Line<'i> {
         let Some(commands) = &mut self.commands else { unreachable!("it was there") };
         let is_own = commands.is_own(write);
         let is_reset = family.profile().command(Command::ResetFault) == commands.own;
+        assert!(!is_own || is_reset || !commands.is_tripped, "it is started in fault");
         assert!(!write.is_urgent && write.halts.is_some() && write.connection.is_some(), "{write}");
         self.halts += u64::from(self.input.byte() == 0xFF);
         if write.halts != Some(self.halts) {
             return Err(Fault { cause: Cause::Halted, raw: Vec::new(), was_sent: false });
         }
-        assert!(!is_own || is_reset || !self.is_tripped, "it is started in fault");
         let came = self.fate(true).map(drop);
         let went_out = came.as_ref().map_or_else(LineError::was_sent, |()| true);
         let is_refused = matches!(&came, Err(Fault { cause: Cause::Refused(code, _), .. })

@@ -713,8 +713,8 @@ class Unit:
     `"halted_before"` or `"not_written"` as below, `"halted"`, `"tripped"` and a look as of `Looks.look`, `"port_lost"`
     and the error, or one of the last look; `"halted"` and the error; `"halted_between"` and the error or None;
     `"unanswered"`, the error, and a look or the error instead of one; `"refused_and_turns"`, the error and a look;
-    `"port_lost"` and the error; `"unshown"`, the last look and None, or `"unread"` and the error of that; `"ignored"`
-    and settings.
+    `"port_lost"` and the error; `"unshown"`, the last look and None, or `"unread"` and the error of that;
+    `"ignored"`, settings, and a kind with what is told of it.
 
     `"not_ready"`: `"may_not"`, `"unseen"`, `"unstoppable"`; `"bad_link"`, how many of the last exchanges were good and
     how many there were, and how many looks failed of how many; `"settings"`, what it does otherwise (`"words"`,

@@ -119,7 +119,7 @@ impl Unit {
         }
         match self.ignores_commands(line).await {
             Ok(wrong) if wrong.is_empty() => Err(not_reset(found, why)),
-            Ok(wrong) => Err(not_reset(found, Why::Ignored(wrong))),
+            Ok(wrong) => Err(not_reset(found, Why::Ignored { wrong, unshown: Box::new(why) })),
             Err(error) => Err(not_reset(found, Why::Unseen(error))),
         }
     }

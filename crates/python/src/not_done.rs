@@ -59,7 +59,10 @@ fn why_not_commanded(py: Python<'_>, why: WhyNotCommanded<Failed>) -> PyResult<T
         Why::RefusedAndTurns { last, look } => ("refused_and_turns", (raised(py, last)?, shown(look)).into_py_any(py)?),
         Why::PortLost(error) => ("port_lost", raised(py, error)?),
         Why::Unshown(last) => last_look(py, last)?,
-        Why::Ignored(wrong) => ("ignored", wrong.into_iter().map(setting).collect::<Vec<_>>().into_py_any(py)?),
+        Why::Ignored { wrong, unshown } => {
+            let wrong: Vec<_> = wrong.into_iter().map(setting).collect();
+            ("ignored", (wrong, why_not_commanded(py, *unshown)?).into_py_any(py)?)
+        }
         Why::Failed(error) | Why::Unseen(error) => return Err(error.into()),
         why => return Err(unknown(&why)),
     })

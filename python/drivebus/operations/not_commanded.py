@@ -63,7 +63,8 @@ def _sent(unit: DriveView, name: str, found: float, kind: str, told: Any) -> tup
     if kind == "port_lost":
         return _port_lost(unit, name, told, found), told
     if kind == "ignored":
-        return _ignored(unit, told), None
+        wrong, unshown = told
+        return _ignored(unit, wrong), in_words(unit, name, found, *unshown, confirm=0.0)
     if kind == "unread":
         return _unshown(unit, name, f"its last answer: {told}; {glances.seen_last(unit, found)}"), None
     return _unshown(unit, name, _seen_last(unit, *told)), None

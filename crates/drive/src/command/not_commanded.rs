@@ -80,8 +80,13 @@ pub enum WhyNotCommanded<E> {
     #[error("it was taken, and the state does not show it: {0}. It was not repeated")]
     Unshown(LastLook<E>),
     /// It was taken and not shown, for the drive does not take commands from the bus.
-    #[error("it was taken and not shown, for the drive does not take commands from the bus: {}", told(.0))]
-    Ignored(Vec<Setting>),
+    #[error("{unshown}; the drive does not take commands from the bus: {}", told(.wrong))]
+    Ignored {
+        /// Which settings keep it from that.
+        wrong: Vec<Setting>,
+        /// How it is not shown.
+        unshown: Box<Self>,
+    },
     /// It was sent, and what it came to could not be looked at, for a reason that says nothing of the unit.
     #[error("it was sent, and could not be looked at: {0}")]
     Unseen(E),
@@ -142,7 +147,7 @@ impl<E: LineError> WhyNotCommanded<E> {
             | Self::RefusedAndTurns { .. }
             | Self::PortLost(_)
             | Self::Unshown(_)
-            | Self::Ignored(_)
+            | Self::Ignored { .. }
             | Self::Unseen(_) => true,
             Self::NotLedUp(NotLedUp { number, why }) => *number > 0 || !matches!(why, WhyNotLedUp::HaltedBefore(_)),
             Self::NotWritten(why) => why.was_sent() && !why.cause().is_refusal(),
