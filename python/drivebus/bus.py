@@ -9,29 +9,28 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import TracebackType
-from typing import Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from drivebus import _native
 from drivebus.checks import UNITS
 from drivebus.drive import Drive
-from drivebus.identify import scan
-from drivebus.identify.identify import identify
 from drivebus.identify.profile_choice import profile_of
-from drivebus.identify.results import Found, Identification
 from drivebus.line.asking import asking
 from drivebus.line.blocking import BlockingBus, at_once
 from drivebus.line.blocking_requests import Requests
-from drivebus.line.poll_samples import Names, Reads, Sample
-from drivebus.line.scan_order import asked
 from drivebus.line.settings import BusFace, Opening, check_trust
 from drivebus.line.units import belongs
 from drivebus.operations.drive_base import views
 from drivebus.operations.halting import WITHIN
 from drivebus.operations.program_end import end_over
 from drivebus.operations.stop_all import stop_all
-from drivebus.poll import Poll
 from drivebus.profile import Profile, native_of
 from drivebus.strict_attributes import known_only
+
+if TYPE_CHECKING:
+    from drivebus.identify.results import Found, Identification
+    from drivebus.line.poll_samples import Names, Reads, Sample
+    from drivebus.poll import Poll
 
 __all__ = ["Bus"]
 
@@ -160,10 +159,15 @@ class Bus(BusFace, Requests):
             protocol: `"auto"`, as above; `"modbus"`: in that one alone; `"huanyang"`: each of *units* is asked in that
                 one alone, and who speaks Modbus is not told.
         """
+        from drivebus.identify import scan
+
         limit = scan.time_for(timeout, self._opening.timeout)
         return self._scan(scan.units(units, self._opening.known.addresses), limit, scan.protocol_of(protocol))
 
     def _scan(self, units: Sequence[int], timeout: float, protocol: str) -> Iterator[Found]:
+        from drivebus.identify import scan
+        from drivebus.line.scan_order import asked
+
         read = asking(BlockingBus(self), timeout=timeout, retries=0)
 
         async def ask(unit: int, pdu: bytes, reply_length: int) -> bytes:
@@ -189,6 +193,8 @@ class Bus(BusFace, Requests):
         Raises:
             NoAnswer, BadAnswer, PortError: It did not answer at all.
         """
+        from drivebus.identify.identify import identify
+
         return at_once(identify(BlockingBus(self).ask, self._opening.known.addresses.unit(unit)))
 
     def drive(
@@ -291,4 +297,6 @@ class Bus(BusFace, Requests):
                 shorter than the wire can carry at this baud rate; the message has the shortest. Nothing was sent.
             PortError: The bus is closed.
         """
+        from drivebus.poll import Poll
+
         return Poll(self, self._native, targets, interval, size, callback)

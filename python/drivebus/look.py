@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from drivebus import _native
-from drivebus.values import ControlSource, Fault, State
+from drivebus.values import ControlSource, State
+
+if TYPE_CHECKING:
+    from drivebus.values import Fault
 
 __all__ = ["STANDSTILL", "Look"]
 

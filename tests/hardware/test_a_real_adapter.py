@@ -14,7 +14,7 @@ import pytest
 
 import drivebus
 from drivebus.doctor import examine
-from drivebus.line import port_urls
+from drivebus.line import port_facts
 
 pytestmark = [
     pytest.mark.hardware,
@@ -27,7 +27,7 @@ BAUD = int(os.environ.get("DRIVEBUS_BAUD", "19200"))
 
 
 def timer() -> int | None:
-    return port_urls.facts(PORT).latency_timer_ms
+    return port_facts.facts(PORT).latency_timer_ms
 
 
 def test_the_latency_timer_is_least_while_the_port_is_open_and_as_it_was_afterwards() -> None:

@@ -12,7 +12,7 @@ import pytest
 import drivebus
 from drivebus import Bus, NotAllowed, PortError, Simulator
 from drivebus.doctor import Finding, Severity, examine
-from drivebus.line import port_urls
+from drivebus.line import port_facts
 from drivebus.line.frames import frames_in
 from drivebus.line_search.order import candidates
 from drivebus.line_search.settings import Settings
@@ -374,8 +374,8 @@ class TestTheAdapter:
 
     def test_a_latency_timer_is_a_warning_with_the_rule_that_shortens_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
         rule = 'ATTR{latency_timer}="1"'
-        facts = port_urls.PortFacts("ftdi_sio", "USB 0403:6001", 16, rule, [])
-        monkeypatch.setattr(port_urls, "facts", lambda _: facts)
+        facts = port_facts.PortFacts("ftdi_sio", "USB 0403:6001", 16, rule, [])
+        monkeypatch.setattr(port_facts, "facts", lambda _: facts)
         with Simulator({1: "gd350"}) as simulator:
             findings = examine(simulator.port, 1, listen=0.01)
             opened, timer = next(findings), next(findings)
@@ -390,7 +390,7 @@ class TestTheAdapter:
 
     def test_the_system_knows_a_port(self) -> None:
         with Simulator({1: "gd350"}) as simulator, Bus(simulator.port):
-            facts = port_urls.facts(simulator.port)
+            facts = port_facts.facts(simulator.port)
             assert facts.latency_timer_ms is None
             if sys.platform == "linux":
                 assert len(facts.holders) == 1

@@ -14,7 +14,7 @@ import pytest
 import drivebus
 import drivebus.aio
 from drivebus import Bus, DrivebusError, Identification, NotAllowed, Simulator
-from drivebus.identify import identify
+from drivebus.identify.identify import identify
 from drivebus.line.asking import Read
 
 UNITS = {1: "gd350", 2: "gd300", 3: "vfd500", 4: "gd600", 5: "gd35", 6: "gd3000"}

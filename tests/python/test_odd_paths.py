@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 import drivebus.aio
 import drivebus.doctor
-import drivebus.line.port_urls
+import drivebus.line.port_facts
 from drivebus import Backup, Bus, DrivebusError, NotAllowed, Profile, Simulator
 from drivebus.cli import cli
 
@@ -151,7 +151,7 @@ def test_the_doctor_says_what_is_no_port(things: dict[str, str]) -> None:
 @pytest.mark.parametrize("name", NO_NAMES.values(), ids=NO_NAMES.keys())
 def test_what_the_system_is_asked_of_a_port_that_is_none(name: Any) -> None:
     try:
-        facts = drivebus.line.port_urls.facts(name)
+        facts = drivebus.line.port_facts.facts(name)
     except NotAllowed:
         return
     assert facts.driver is None

@@ -13,7 +13,7 @@ import pytest
 
 import drivebus
 from drivebus import Bus, Drive, Profile, Simulator, State, rtu, trial
-from drivebus.line.trace import meaning
+from drivebus.line.meaning import meaning
 
 SHARE = Path(__file__).resolve().parents[2] / "crates/sim/tests/profiles/share"
 STATUS, SPEED, TORQUE = 0x0008, 0x0009, 0x0106

@@ -22,7 +22,7 @@ import drivebus.aio
 from drivebus import Bus, Drive, NotAllowed, Profile, Simulator, State, Unconfirmed
 from drivebus.cli.present import profile_rules
 from drivebus.line.asking import Write
-from drivebus.line.trace import meaning
+from drivebus.line.meaning import meaning
 
 ACME = Path(__file__).resolve().parents[2] / "crates/sim/tests/profiles/acme"
 ORDER, STATUS = 0x9000, 0xA000

@@ -16,7 +16,8 @@ from click.testing import CliRunner
 import drivebus
 import drivebus.aio
 from drivebus.cli import cli
-from drivebus.line.trace import LOGGER, meaning
+from drivebus.line.meaning import meaning
+from drivebus.line.trace import LOGGER
 
 GD350 = drivebus.Profile.builtin("gd350")
 

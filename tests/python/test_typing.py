@@ -17,7 +17,7 @@ from typing_extensions import assert_type
 import drivebus
 import drivebus.aio
 from drivebus import Bus, Drive, NotAllowed, Poll
-from drivebus.line.settings import BusOptions
+from drivebus.line.bus_options import BusOptions
 
 
 @pytest.fixture

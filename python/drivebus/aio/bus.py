@@ -28,7 +28,7 @@ from drivebus.line.blocking_requests import Requests
 from drivebus.line.poll_samples import Names, Reads
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.scan_order import asked
-from drivebus.line.settings import BusFace, BusOptions, Opening, check_trust
+from drivebus.line.settings import BusFace, Opening, check_trust
 from drivebus.line.stats import Link
 from drivebus.line.units import belongs
 from drivebus.operations.drive_base import documented_by, views
@@ -41,6 +41,8 @@ from drivebus.strict_attributes import known_only
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
+
+    from drivebus.line.bus_options import BusOptions
 
 __all__ = ["Bus"]
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from drivebus.bus import Bus
 from drivebus.doctor.findings import Finding, Severity
 from drivebus.errors import PortError
-from drivebus.line import port_urls
+from drivebus.line import port_facts
 from drivebus.line_search.settings import Settings
 
 __all__ = ["adapter_findings", "port_finding"]
@@ -32,7 +32,7 @@ def adapter_findings(bus: Bus, port: object) -> Iterator[Finding]:
             yield Finding("adapter", "setting", Severity.NOTE, note)
 
 
-def _opened(bus: Bus, facts: port_urls.PortFacts | None) -> Finding:
+def _opened(bus: Bus, facts: port_facts.PortFacts | None) -> Finding:
     what = [text for text in (facts and facts.adapter, facts and facts.driver and f"driver {facts.driver}") if text]
     described = f" ({', '.join(what)})" if what else ""
     return Finding(
@@ -60,8 +60,8 @@ def _latency_timer(timer: int, rule: str | None) -> Finding:
     )
 
 
-def _facts(port: object) -> port_urls.PortFacts | None:
+def _facts(port: object) -> port_facts.PortFacts | None:
     """What the system tells of *port*, if it is one that the system knows: a path."""
     if isinstance(port, os.PathLike):
         port = os.fspath(port)
-    return port_urls.facts(port) if isinstance(port, str) and "://" not in port else None
+    return port_facts.facts(port) if isinstance(port, str) and "://" not in port else None

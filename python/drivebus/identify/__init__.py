@@ -1,5 +1,1 @@
 """What the unit at an address is, whether that agrees with what it was named, and whether it still is the same one."""
-
-from drivebus.identify.identify import identify
-
-__all__ = ["identify"]

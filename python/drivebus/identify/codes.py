@@ -7,11 +7,13 @@ programs alone. Whoever wants to know of a code asks here; the tables themselves
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivebus import _native
 from drivebus.profile import Profile
-from drivebus.profile.facts import IdentificationCode
+
+if TYPE_CHECKING:
+    from drivebus.profile.facts import IdentificationCode
 
 __all__ = ["address_of", "all_listed", "families_in", "listed_at", "registers", "rows_of"]
 
@@ -42,6 +44,8 @@ def listed_at(address: int, word: int) -> list[IdentificationCode]:
 
 def rows_of(native: Iterable[dict[str, Any]]) -> list[IdentificationCode]:
     """Rows as the core has them."""
+    from drivebus.profile.facts import IdentificationCode
+
     return [IdentificationCode(**{**row, "shared": tuple(row["shared"])}) for row in native]
 
 

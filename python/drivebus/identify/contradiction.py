@@ -7,7 +7,7 @@ A profile is named by people, and people mistake one drive for another. What spe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivebus import tables
 from drivebus.advice import Advice, Text, argument
@@ -15,8 +15,10 @@ from drivebus.identify import codes
 from drivebus.identify.families import asked_as, one_of, shipped
 from drivebus.identify.refusals import Answer
 from drivebus.profile import Profile, profiles
-from drivebus.profile.facts import IdentificationCode
 from drivebus.profile.family import family_of
+
+if TYPE_CHECKING:
+    from drivebus.profile.facts import IdentificationCode
 
 __all__ = ["contradiction", "in_words"]
 

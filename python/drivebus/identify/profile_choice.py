@@ -5,17 +5,19 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from drivebus import _native, checks
 from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed, SharedCodeWarning, WrongDrive, level_of_the_program
 from drivebus.identify.families import drive_as, one_of, shipped
-from drivebus.identify.identify import identify
-from drivebus.identify.results import Identification
 from drivebus.line.asking import asking
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.units import units_of
 from drivebus.profile import Profile, profiles
+
+if TYPE_CHECKING:
+    from drivebus.identify.results import Identification
 
 __all__ = ["profile_of", "usable"]
 
@@ -35,6 +37,8 @@ async def profile_of(
         )
     code: int | None = None
     if profile is None:
+        from drivebus.identify.identify import identify
+
         connection = bus.reconnects
         found = await identify(asking(bus, urgent=checks.flag("urgent", urgent)), unit)
         known, code = _sure_enough(found, checks.flag("unverified", unverified)), found.code

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Coroutine
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from drivebus.line.asking import Read, Stamped, Write
 from drivebus.line.blocking_requests import Requests
 from drivebus.line.protocols import BusProtocol, CountsHalts
-from drivebus.line.stats import Link
+
+if TYPE_CHECKING:
+    from drivebus.line.stats import Link
 
 __all__ = ["BlockingBus", "at_once"]
 

@@ -6,12 +6,14 @@ The functions check what is given, before anything is sent; `drivebus.aio.reques
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivebus import _native, checks, tables
 from drivebus.errors import BadArgument
-from drivebus.line.stats import Link
 from drivebus.line.units import Units
+
+if TYPE_CHECKING:
+    from drivebus.line.stats import Link
 
 __all__ = ["Requests", "alone_of", "broadcast_of", "echo_of", "read_of", "seconds_of", "transact_of", "write_of"]
 
@@ -172,6 +174,8 @@ class Requests:
 
     def link(self, unit: int) -> Link:
         """How well *unit* could be reached: of its last exchanges, ten at most, how many brought an answer."""
+        from drivebus.line.stats import Link
+
         return Link(*self._native.link(self._known.addresses.unit(unit)))
 
     def halts(self, unit: int) -> int:

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from drivebus.line.asking import Asks
-from drivebus.line.stats import Link
+
+if TYPE_CHECKING:
+    from drivebus.line.stats import Link
 
 __all__ = ["AwaitableBus", "AwaitsHalts", "BusProtocol", "CountsHalts", "KeepsWills"]
 

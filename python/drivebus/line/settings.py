@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol, TypedDict
+from typing import TYPE_CHECKING, Any, Protocol
 
 from drivebus import _native, checks
 from drivebus._native import SerialFormat
@@ -13,7 +13,6 @@ from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument
 from drivebus.line import port_urls
 from drivebus.line.addresses import Addresses
-from drivebus.line.stats import Stats
 from drivebus.line.trace import Trace
 from drivebus.line.units import Units
 from drivebus.sim import Simulator, core_of, lasting_port
@@ -21,8 +20,9 @@ from drivebus.strict_attributes import known_keywords
 
 if TYPE_CHECKING:
     from drivebus.line.pcapng_trace import WireFile
+    from drivebus.line.stats import Stats
 
-__all__ = ["BusFace", "BusOptions", "Opening", "check_trust"]
+__all__ = ["BusFace", "Opening", "check_trust"]
 
 
 class Opening:
@@ -129,30 +129,6 @@ def _check_together(port: object, keywords: Mapping[str, Any]) -> None:
     named = os.fspath(port) if isinstance(port, (str, os.PathLike)) else None
     name = named if isinstance(named, str) else None
     _native.check_port_options(name, keywords["rs485"] is not None, keywords["echo"])
-
-
-class BusOptions(TypedDict, total=False):
-    """What a bus is opened with besides its port: the keywords of `BusFace`, for calls that hand them on."""
-
-    baudrate: int
-    parity: str
-    stopbits: int
-    bytesize: int
-    silence: str | float
-    timeout: float
-    retries: int
-    read_only: bool
-    rs485: Mapping[str, object] | None
-    echo: str
-    turnaround: float
-    learn_timeout: bool
-    low_latency: bool
-    queue: int
-    share: str
-    group: str | int | None
-    realtime: bool
-    reserved: bool
-    trace: str | os.PathLike[str] | None
 
 
 class _Native(Protocol):
@@ -327,4 +303,6 @@ class BusFace:
         Where another program has the port, it is asked, and waited for, a second at most: an event loop stands still
         meanwhile.
         """
+        from drivebus.line.stats import Stats
+
         return Stats(self._core().stats())

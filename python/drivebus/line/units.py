@@ -16,7 +16,6 @@ from drivebus._native import Identity, Record
 from drivebus.line.addresses import Addresses
 from drivebus.line.write_guard import check_words, prepare_guard
 from drivebus.profile import Profile
-from drivebus.rtu import written
 from drivebus.values import State
 
 __all__ = ["UnitRecord", "Units", "belongs", "units_of"]
@@ -130,6 +129,8 @@ class Units:
 
     def check_pdu(self, unit: int, pdu: bytes, force: bool = False) -> None:
         """As `check`, for what a request to write carries; any other is let pass."""
+        from drivebus.rtu import written
+
         write = written(pdu)
         if write is not None:
             address, words = write

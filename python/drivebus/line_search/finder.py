@@ -15,7 +15,7 @@ from drivebus import checks
 from drivebus.bus import Bus
 from drivebus.errors import BadAnswer, BadArgument, NoAnswer, PortError
 from drivebus.identify.scan import speaks_otherwise
-from drivebus.line import huanyang, port_urls
+from drivebus.line import huanyang, port_facts
 from drivebus.line.frames import frames_in, may_be_of
 from drivebus.line.stats import noisy
 from drivebus.line_search.located import Located, Progress
@@ -290,7 +290,7 @@ class Search(Iterator[Located]):
     def _not_to_be_had(self, error: PortError) -> PortError:
         """*error*, with why another program that shares the port does not help, where one has it."""
         path = self._port if isinstance(self._port, (str, os.PathLike)) else None
-        if path is None or self._fixed or not port_urls.facts(path).holders:
+        if path is None or self._fixed or not port_facts.facts(path).holders:
             return error
         why = "A search changes how the port is set, so it cannot go through another program"
         return PortError(f"{error}. {why}", errno=error.errno)

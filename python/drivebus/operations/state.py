@@ -7,6 +7,7 @@ reason is kept: half of a status is better than none.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from drivebus.errors import BadArgument
 from drivebus.look import Look
@@ -15,7 +16,10 @@ from drivebus.operations.drive_view import DriveView
 from drivebus.operations.explained import read_words
 from drivebus.operations.glances import glance, planned, remember
 from drivebus.profile.evidence import Evidence
-from drivebus.values import Fault, State, Status
+from drivebus.values import State
+
+if TYPE_CHECKING:
+    from drivebus.values import Fault, Status
 
 __all__ = [
     "fault",
@@ -88,6 +92,8 @@ async def status(unit: DriveView, *, unverified: bool = False) -> Status:
 
 
 async def _status(unit: DriveView, seen: Look) -> Status:
+    from drivebus.values import Status
+
     missing = dict(seen.missing)
     names = {}
     for role in ("frequency", "setpoint"):

@@ -8,21 +8,23 @@ from __future__ import annotations
 import functools
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivebus import _native, checks
 from drivebus.errors import BadArgument, Decision
-from drivebus.profile.facts import (
-    FactorySerial,
-    IdentificationCode,
-    Memory,
-    RequestRules,
-    Setting,
-    StartStep,
-    Variant,
-)
-from drivebus.profile.plan import ReadPlan
-from drivebus.values import Description, Fault, WatchdogSettings
+
+if TYPE_CHECKING:
+    from drivebus.profile.facts import (
+        FactorySerial,
+        IdentificationCode,
+        Memory,
+        RequestRules,
+        Setting,
+        StartStep,
+        Variant,
+    )
+    from drivebus.profile.plan import ReadPlan
+    from drivebus.values import Description, Fault, WatchdogSettings
 
 __all__ = ["Profile", "native_of", "profiles"]
 
@@ -134,10 +136,14 @@ class Profile:
 
     def requests(self) -> RequestRules:
         """What else is known of requests."""
+        from drivebus.profile.facts import RequestRules
+
         return RequestRules(**self._native.requests())
 
     def serial(self) -> FactorySerial | None:
         """How the factory sets the line; None where that is not printed."""
+        from drivebus.profile.facts import FactorySerial
+
         known = self._native.serial()
         return None if known is None else FactorySerial(**known)
 
@@ -204,6 +210,8 @@ class Profile:
         """Everything that is known about one register or parameter. NotAllowed names the closest name."""
         known = self._descriptions.get(name)
         if known is None:
+            from drivebus.values import Description
+
             known = self._descriptions[name] = Description(**self._native.describe(name))
         return known
 
@@ -250,6 +258,8 @@ class Profile:
         except TypeError:  # what cannot be looked up is no name, as the core says in its own words
             plan = None
         if plan is None:
+            from drivebus.profile.plan import ReadPlan
+
             native = self._native.compile(key)
             plan = ReadPlan(native, [self.describe(name) for name in native.names])
             if len(self._plans) >= _PLANS_KEPT:
@@ -286,6 +296,8 @@ class Profile:
 
     def start_sequence(self) -> list[StartStep]:
         """The words that come, in this order, before one that runs or jogs a motor at rest; none of most families."""
+        from drivebus.profile.facts import StartStep
+
         return [StartStep(**step) for step in self._native.start_sequence()]
 
     @property
@@ -295,6 +307,8 @@ class Profile:
 
     def memory(self) -> Memory | None:
         """Where a written parameter is kept: None where every write may wear EEPROM."""
+        from drivebus.profile.facts import Memory
+
         known = self._native.memory()
         return None if known is None else Memory(**known)
 
@@ -328,10 +342,14 @@ class Profile:
 
     def needs(self, setpoint: str, /) -> list[Setting]:
         """What must be set before the drive takes *setpoint*."""
+        from drivebus.profile.facts import Setting
+
         return [Setting(**row) for row in self._native.needs(setpoint)]
 
     def variants(self) -> dict[str, Variant]:
         """Parameters that decide what some registers mean, by what they decide, such as `"speed_unit"`."""
+        from drivebus.profile.facts import Variant
+
         return {name: Variant(**row) for name, row in self._native.variants().items()}
 
     @property
@@ -349,6 +367,8 @@ class Profile:
 
     def control(self) -> list[Setting]:
         """What must be set before the drive obeys the bus, in the order in which to set it."""
+        from drivebus.profile.facts import Setting
+
         return [Setting(**row) for row in self._native.control()]
 
     def fault_number(self, raw: int, /) -> int:
@@ -385,6 +405,8 @@ class Profile:
 
     def identifications(self) -> list[IdentificationCode]:
         """The identification codes that this profile knows."""
+        from drivebus.profile.facts import IdentificationCode
+
         rows = self._native.identifications()
         return [IdentificationCode(**{**row, "shared": tuple(row["shared"])}) for row in rows]
 
@@ -402,6 +424,8 @@ class Profile:
     @property
     def watchdog(self) -> WatchdogSettings | None:
         """The settings that make the drive act by itself when its bus falls silent; None if the family has none."""
+        from drivebus.values import WatchdogSettings
+
         settings = self._native.watchdog()
         return None if settings is None else WatchdogSettings(**settings)
 
@@ -458,5 +482,7 @@ def _builtin(name: str) -> Profile:
 
 
 def _fault(row: dict[str, Any]) -> Fault:
+    from drivebus.values import Fault
+
     known: dict[str, Any] = {key: "" if told is None else told for key, told in row.items() if key != "source"}
     return Fault(**known)

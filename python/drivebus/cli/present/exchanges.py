@@ -12,7 +12,7 @@ from drivebus.cli.present.errors import exit_code
 from drivebus.cli.present.moments import moment, time_of_day
 from drivebus.cli.present.output import Output, remark
 from drivebus.line import huanyang
-from drivebus.line.trace import meaning
+from drivebus.line.meaning import meaning
 from drivebus.sniffer import Exchange, Families
 
 __all__ = ["Filter", "Lines", "taken_back"]

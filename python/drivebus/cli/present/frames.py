@@ -10,8 +10,8 @@ import click
 import drivebus
 from drivebus.cli.present.moments import time_of_day
 from drivebus.cli.present.output import Output, remark
+from drivebus.line.meaning import meaning
 from drivebus.line.trace import LOGGER as TRACE_LOGGER
-from drivebus.line.trace import meaning
 
 __all__ = ["show_frame", "show_frames"]
 

@@ -10,7 +10,7 @@ from drivebus.cli import names
 from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.wrong_use import WrongUse
 from drivebus.line.addresses import Addresses
-from drivebus.line.trace import meaning
+from drivebus.line.meaning import meaning
 from drivebus.rtu import framed
 
 __all__ = ["Request", "check_commands", "request_of"]
