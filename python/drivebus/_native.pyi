@@ -816,6 +816,9 @@ class Halt:
     def wait(self, seconds: float, /) -> None:
         """For *seconds* others were seen to: its proof does not count them."""
 
+def begin_families() -> None:
+    """Begins to work out the shipped families, which a drive needs, in a thread that ends by itself."""
+
 def code_places() -> list[int]:
     """Where units of the shipped families keep their codes."""
 

@@ -62,6 +62,16 @@ impl Family {
     }
 }
 
+/// Begins to work the shipped families out, for whoever will ask for them soon. Where no thread can be had, they are
+/// worked out when they are asked for.
+#[pyfunction]
+pub(crate) fn begin_families() {
+    let begun = std::thread::Builder::new().name("drivebus-families".to_owned()).spawn(|| {
+        Families::shipped();
+    });
+    drop(begun);
+}
+
 /// Where units of the shipped families keep their codes.
 #[pyfunction]
 pub(crate) fn code_places() -> Vec<u32> {

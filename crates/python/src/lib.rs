@@ -56,7 +56,7 @@ mod _native {
     #[pymodule_export]
     use crate::ending::{begin_of_child, end_of_program};
     #[pymodule_export]
-    use crate::family::{Family, code_places, code_rows, listed_codes};
+    use crate::family::{Family, begin_families, code_places, code_rows, listed_codes};
     #[pymodule_export]
     use crate::format::SerialFormat;
     #[pymodule_export]

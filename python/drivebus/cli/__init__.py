@@ -6,6 +6,7 @@ Each part is loaded when it is needed: a stop does not wait for what only tables
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import drivebus
@@ -16,11 +17,20 @@ if TYPE_CHECKING:
 
 __all__ = ["cli", "main"]
 
+_HALTS = {"stop", "coast"}
+"""Commands that are not to wait until the families are worked out: that goes on while the program is loaded."""
+
 
 def main() -> None:
     """The entry point of the command."""
     if sys.argv[1:] == ["--version"] and _told_version():
         return
+    if not _HALTS.isdisjoint(sys.argv):
+        # Why the core cannot be loaded is told by whoever needs it.
+        with suppress(ImportError):
+            from drivebus.line.early_families import begin_families
+
+            begin_families()
     from drivebus.cli import app
 
     app.main()
