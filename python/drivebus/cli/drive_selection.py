@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
-from click.shell_completion import CompletionItem
 
 import drivebus
-from drivebus.cli.names import parse_units
+from drivebus.cli.names import completions, parse_units
 from drivebus.cli.session import Session
 from drivebus.cli.wrong_use import WrongUse
 from drivebus.line.addresses import EVERYBODY
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from drivebus.site import Site, SiteDrive, SiteLine
 
 __all__ = ["chosen", "complete_drive", "complete_port", "find_site", "of_drive"]
@@ -132,13 +133,13 @@ def _characters(base: Session, line: SiteLine) -> tuple[int, tuple[str, str, str
 
 def complete_drive(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Names of drives and groups, for the shell."""
-    return [CompletionItem(name) for name in _known(context, "drives", "groups") if name.startswith(incomplete)]
+    return completions(name for name in _known(context, "drives", "groups") if name.startswith(incomplete))
 
 
 def complete_port(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Names of lines, and files, for the shell."""
-    lines = [CompletionItem(name) for name in _known(context, "lines") if incomplete and name.startswith(incomplete)]
-    return lines or [CompletionItem(incomplete, type="file")]
+    lines = completions(name for name in _known(context, "lines") if incomplete and name.startswith(incomplete))
+    return lines or completions([incomplete], "file")
 
 
 def _known(context: click.Context, *sections: str) -> list[str]:

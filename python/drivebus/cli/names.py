@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import click
-from click.shell_completion import CompletionItem
 
 import drivebus
 from drivebus.cli.option_types import with_a_point
 from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.wrong_use import WrongUse
 from drivebus.line.addresses import EVERYBODY, Addresses
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 __all__ = [
     "complete_assignment",
@@ -20,6 +24,7 @@ __all__ = [
     "complete_profile",
     "complete_units",
     "complete_variant",
+    "completions",
     "evidence",
     "named",
     "parse_assignment",
@@ -31,7 +36,7 @@ __all__ = [
     "without_unit",
 ]
 
-_ADDRESS = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h)", re.IGNORECASE)
+_ADDRESS = r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h)"
 
 
 def resolve(profile: drivebus.Profile, text: str, *, written: bool = False) -> str | int:
@@ -45,7 +50,7 @@ def resolve(profile: drivebus.Profile, text: str, *, written: bool = False) -> s
         raise WrongUse("an empty text is not a name; give one such as output_current, P00.11 or 3004H")
     if "=" in text:
         raise WrongUse(f'"{text}" is not a name; `drivebus write {text}` gives something a value')
-    match = _ADDRESS.fullmatch(text)
+    match = re.fullmatch(_ADDRESS, text, re.IGNORECASE)
     if match:
         address = int(match[1] or match[2], 16)
         return profile.name_at(address, written=written) or address
@@ -108,15 +113,15 @@ def parse_units(text: str, addresses: Addresses = EVERYBODY) -> list[int]:
     """Units of a text such as `1-31,40`, if the line has such *addresses*; which those are may not be known yet."""
     units: list[int] = []
     for part in text.split(","):
-        match = re.fullmatch(r"\s*(\d{1,20})\s*(?:-\s*(\d{1,20})\s*)?", part)
-        if match is None:
+        begins, is_range, ends = (each.strip() for each in part.partition("-"))
+        given = [begins, ends] if is_range else [begins]
+        if not all(each.isdecimal() and len(each) <= 20 for each in given):
             raise WrongUse(f'"{part}" is not a unit address; write 1-247, or a list such as 1-31,40')
-        first, last = int(match[1]), int(match[2] or match[1])
+        first, last = int(given[0]), int(given[-1])
         # What a line has is without a gap.
         why = addresses.why_not(first) or addresses.why_not(last)
         if why:
-            which = "unit" if match[2] is None else "units"
-            are = "is" if match[2] is None else "are"
+            which, are = ("units", "are") if is_range else ("unit", "is")
             raise WrongUse(f'{which} "{part.strip()}" {are} out of range; allowed is 1 to 247; {in_commands(why)}')
         if first > last:
             raise WrongUse(f'units "{part.strip()}": the first is above the last; write {last}-{first}')
@@ -164,14 +169,21 @@ def _profiles(context: click.Context) -> list[drivebus.Profile]:
         return []
 
 
+def completions(texts: Iterable[str], kind: str = "plain") -> list[CompletionItem]:
+    """*texts* as the shell offers them; of the *kind* `"file"` or `"dir"` it looks for those that begin so itself."""
+    from click.shell_completion import CompletionItem
+
+    return [CompletionItem(text, type=kind) for text in texts]
+
+
 def complete_name(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Names and codes of the profile that is given, or of all, for the shell."""
-    return [CompletionItem(name) for name in _names(context) if name.lower().startswith(incomplete.lower())]
+    return completions(name for name in _names(context) if name.lower().startswith(incomplete.lower()))
 
 
 def complete_assignment(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """As `complete_name`, up to the equals sign."""
-    return [CompletionItem(f"{item.value}=") for item in complete_name(context, parameter, incomplete)]
+    return completions(f"{item.value}=" for item in complete_name(context, parameter, incomplete))
 
 
 def complete_group(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -179,13 +191,13 @@ def complete_group(context: click.Context, _parameter: click.Parameter, incomple
     known = (profile.describe(name) for profile in _profiles(context) for name in profile.names())
     codes = {".", "-"} & set(incomplete)
     texts = [row.code if codes else row.group for row in known if row.code is not None]
-    return [CompletionItem(text) for text in dict.fromkeys(texts) if text.lower().startswith(incomplete.lower())]
+    return completions(text for text in dict.fromkeys(texts) if text.lower().startswith(incomplete.lower()))
 
 
 def complete_profile(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Names of the shipped profiles, and folders, for the shell."""
-    known = [CompletionItem(name) for name in drivebus.profiles() if name.startswith(incomplete)]
-    return known or [CompletionItem(incomplete, type="dir")]
+    known = completions(name for name in drivebus.profiles() if name.startswith(incomplete))
+    return known or completions([incomplete], "dir")
 
 
 def complete_units(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -193,7 +205,7 @@ def complete_units(_context: click.Context, _parameter: click.Parameter, incompl
     before, equals, begun = incomplete.rpartition("=")
     if not equals or "," in begun:
         return []
-    return [CompletionItem(f"{before}={name}") for name in drivebus.profiles() if name.startswith(begun)]
+    return completions(f"{before}={name}" for name in drivebus.profiles() if name.startswith(begun))
 
 
 def complete_variant(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -204,4 +216,4 @@ def complete_variant(context: click.Context, _parameter: click.Parameter, incomp
         for name, variant in profile.variants().items()
         for choice in variant.choices
     )
-    return [CompletionItem(text) for text in dict.fromkeys(chosen) if text.startswith(incomplete)]
+    return completions(text for text in dict.fromkeys(chosen) if text.startswith(incomplete))

@@ -7,7 +7,6 @@ named. A question is asked once, for all that have to ask it, before any of them
 
 from __future__ import annotations
 
-import functools
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -20,26 +19,12 @@ import click
 import drivebus
 from drivebus.cli.present.errors import exit_code, tell, tell_wills
 from drivebus.cli.present.output import about, remark
-from drivebus.cli.session import Declined, Session, ask_once, pass_session
+from drivebus.cli.session import Declined, Session, ask_once
 from drivebus.cli.suspension import gives_way_when_held
 
-__all__ = ["Crew", "each_drive"]
+__all__ = ["Crew"]
 
 _Work = Callable[[Session], None]
-
-
-def each_drive(command: Callable[..., None]) -> Callable[..., None]:
-    """A command that several drives can be given, each of which it is done for by itself."""
-
-    @pass_session
-    @functools.wraps(command)
-    def done(session: Session, /, *args: Any, **options: Any) -> None:
-        if session.several:
-            Crew(session.several).run(lambda one: command(one, *args, **options))
-        else:
-            command(session, *args, **options)
-
-    return done
 
 
 class _Ended(Exception):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
-import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -57,7 +55,7 @@ class Declined(click.ClickException):
         remark(self.message)
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class Session:
     """The options before the command, for one drive.
 
@@ -304,18 +302,18 @@ class Session:
         if self.profile and os.path.isdir(self.profile):  # noqa: PTH112 - Path raises where a name is too long
             problems = len(drivebus.Profile.check(self.profile))
             if problems > 1:
-                remark(f"All {problems}: `drivebus profiles check {shlex.quote(self.profile)}`")
+                remark(f"All {problems}: `drivebus profiles check {_quoted(self.profile)}`")
 
     def command(self, name: str) -> str:
         """The command *name* for the same drive, as it can be typed."""
         words = ["drivebus", *(["--drive", self.name] if self.name else self._line_words())]
         if self.profile is not None:
-            words.append(f"--profile {shlex.quote(self.profile)}")
+            words.append(f"--profile {_quoted(self.profile)}")
         return " ".join([*words, name])
 
     def for_line(self, name: str) -> str:
         """The command *name* for the same port, whatever its settings and units, as it can be typed."""
-        return f"drivebus --port {shlex.quote(str(self.port))} {name}"
+        return f"drivebus --port {_quoted(str(self.port))} {name}"
 
     def setting_words(self) -> list[str]:
         """The options for speed and characters, where they are not as usual."""
@@ -324,7 +322,7 @@ class Session:
 
     def _line_words(self) -> list[str]:
         """The options for the line and the unit, where they are not as usual."""
-        words = ["--port", "…" if self.port is None else shlex.quote(str(self.port)), *self.setting_words()]
+        words = ["--port", "…" if self.port is None else _quoted(str(self.port)), *self.setting_words()]
         if self.unit != 1:
             words.append(f"--unit {self.unit}")
         if self.reserved:
@@ -333,7 +331,7 @@ class Session:
 
     def doctor(self, unit: int | None = None) -> str:
         """The command that looks at the same line, and at *unit*."""
-        words = ["drivebus", "doctor", shlex.quote(str(self.port))]
+        words = ["drivebus", "doctor", _quoted(str(self.port))]
         if unit is not None:
             words.append(f"--unit {unit}")
         words += self.setting_words()
@@ -422,14 +420,21 @@ def within_option(command: Callable[..., Any]) -> Callable[..., Any]:
     return click.option("--within", type=kind, default=10.0, show_default=True, metavar="SECONDS", help=text)(command)
 
 
+def _quoted(text: str) -> str:
+    """*text* as a shell takes it."""
+    import shlex
+
+    return shlex.quote(text)
+
+
 def parse_format(context: click.Context, parameter: click.Parameter, value: str) -> tuple[str, str, str]:
     """Data bits, parity and stop bits of a text such as `8E1`."""
-    match = re.fullmatch(r"([78])([NEO])([12])", value.strip().upper())
-    if match is None:
+    letters = value.strip().upper()
+    if len(letters) != 3 or letters[0] not in "78" or letters[1] not in "NEO" or letters[2] not in "12":
         raise click.BadParameter(
             f'"{value}" is not a character format; give data bits (7, 8), parity (N, E, O) and stop bits (1, 2), '
             "such as 8E1 or 8N1",
             context,
             parameter,
         )
-    return match[1], match[2], match[3]
+    return letters[0], letters[1], letters[2]

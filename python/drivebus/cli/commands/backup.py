@@ -10,9 +10,9 @@ from click.shell_completion import CompletionItem
 
 import drivebus
 from drivebus.backup.unread import in_words
+from drivebus.cli.each_drive import each_drive
 from drivebus.cli.names import complete_group
 from drivebus.cli.option_types import Place
-from drivebus.cli.parallel import each_drive
 from drivebus.cli.present.backups import BackupTaken, Differences, RestoreReport
 from drivebus.cli.present.output import counted, remark
 from drivebus.cli.present.progress import progress_bar

@@ -8,7 +8,7 @@ import click
 
 import drivebus
 from drivebus.cli import names
-from drivebus.cli.parallel import each_drive
+from drivebus.cli.each_drive import each_drive
 from drivebus.cli.present.descriptions import Description, Group, Groups, Matches
 from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.fault_lists import FaultHistory, FaultsByFamily, KnownFaults

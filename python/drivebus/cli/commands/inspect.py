@@ -13,8 +13,8 @@ from rich.progress import Progress
 import drivebus
 from drivebus.cli import names
 from drivebus.cli.commands import scan_search
+from drivebus.cli.each_drive import each_drive
 from drivebus.cli.option_types import Seconds
-from drivebus.cli.parallel import each_drive
 from drivebus.cli.present.drive_facts import DriveStatus, Identity, KnownDrive, Reading, Readings
 from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.errors import exit_code, tell

@@ -13,8 +13,8 @@ import drivebus
 from drivebus import State
 from drivebus.advice import Text
 from drivebus.cli import names
+from drivebus.cli.each_drive import each_drive
 from drivebus.cli.option_types import Hertz, Seconds
-from drivebus.cli.parallel import each_drive
 from drivebus.cli.present.error_wording import in_commands
 from drivebus.cli.present.motors import OBEYING, on_the_way
 from drivebus.cli.present.output import remark

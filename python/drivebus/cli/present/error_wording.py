@@ -49,14 +49,14 @@ _WITH_VALUE = {"profile": "`--profile {}`"}
 """The same, where a value is meant."""
 
 # A name that nothing is near to.
-_NAMELESS = re.compile(r"\S+ has no \"[^\"]*\"$")
+_NAMELESS = r"\S+ has no \"[^\"]*\"$"
 
 
 def in_commands(said: str | DrivebusError) -> str:
     """What *said* says, with commands and options where it names calls and arguments of Python's."""
     text = said.text if isinstance(said, DrivebusError) else Text(said)
     told = "".join(part if isinstance(part, str) else _here(part) for part in text.parts)
-    return _NAMELESS.sub(lambda nameless: f"{nameless[0]}; `drivebus list` shows what it has", told)
+    return re.sub(_NAMELESS, lambda nameless: f"{nameless[0]}; `drivebus list` shows what it has", told)
 
 
 def _here(advice: Advice) -> str:

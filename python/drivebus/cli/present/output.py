@@ -33,7 +33,7 @@ __all__ = ["Output", "Result", "about", "counted", "laid_out", "plain", "printab
 _PIPE_WIDTH = 200
 """Characters a line may have where no terminal limits it: nothing is cut."""
 
-_NUMBER = re.compile(r"-?\d+(\.\d+)?")
+_NUMBER = r"-?\d+(\.\d+)?"
 
 _BETWEEN = 2
 """Blanks between two columns of a table."""
@@ -252,7 +252,7 @@ def _is_number(cell: Any) -> bool:
     """Whether *cell* is a number, or shows one."""
     if isinstance(cell, drivebus.Choice):
         return False
-    return isinstance(cell, (int, float)) or (isinstance(cell, str) and _NUMBER.fullmatch(cell) is not None)
+    return isinstance(cell, (int, float)) or (isinstance(cell, str) and re.fullmatch(_NUMBER, cell) is not None)
 
 
 def _takes_everything(encoding: str | None) -> bool:
@@ -319,7 +319,7 @@ def wrapped(text: str, width: int, hanging: int = 0) -> str:
 
     lines = []
     for line in text.split("\n"):
-        kept = _COMMAND.sub(lambda command: command[0].replace(" ", _NO_BREAK), line)
+        kept = re.sub(_COMMAND, lambda command: command[0].replace(" ", _NO_BREAK), line)
         indent = " " * (len(line) - len(line.lstrip()) + hanging)
         wrapper = TextWrapper(width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
         wrapper.drop_whitespace = True
@@ -328,7 +328,7 @@ def wrapped(text: str, width: int, hanging: int = 0) -> str:
     return "\n".join(lines).replace(_NO_BREAK, " ")
 
 
-_COMMAND = re.compile(r"`[^`]*`")
+_COMMAND = "`[^`]*`"
 _NO_BREAK = "\x00"
 """Stands for a blank at which no line ends; no text that is shown has it."""
 
