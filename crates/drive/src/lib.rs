@@ -65,6 +65,11 @@
 //! | `setpoint` | the frequency that a drive is to run at |
 //! | `ready` | what is looked at before a motor is started |
 //! | `command` | starts and resets: checked, sent once, and proved |
+//! | `parameters` | values written by name: what is allowed, and where it is kept |
+//! | `prepare` | setting a drive to obey the bus |
+//! | `given` | what a drive is given over the bus besides its frequency |
+//! | `bits` | words whose bits are things of their own: terminals, and the special control word |
+//! | `values` | values read by name |
 //! | `task` | operations that wait for a line, and how they are driven without one |
 
 #![forbid(unsafe_code)]
@@ -73,18 +78,22 @@ mod aim;
 mod answer;
 mod apart;
 mod asked;
+mod bits;
 mod codes;
 mod command;
 mod contradiction;
 mod fall;
 mod families;
 mod family;
+mod given;
 mod guard;
 mod halt;
 mod harm;
 pub mod huanyang;
 mod identify;
 mod look;
+mod parameters;
+mod prepare;
 mod ready;
 mod record;
 mod rule;
@@ -99,6 +108,7 @@ mod speed;
 mod taken;
 pub mod task;
 mod unit;
+mod values;
 mod wanted;
 mod writing;
 
@@ -106,17 +116,21 @@ pub use aim::{ANSWER_WITHIN, Aim, NotTaken, Target, check_harmless, goes_out_at_
 pub use answer::{Answer, Said, meanings};
 pub use apart::{Apart, Verdict};
 pub use asked::{NotTold, answer_at, answer_once};
+pub use bits::{FieldInput, NotSetBits};
 pub use codes::Codes;
 pub use command::{NotCommanded, NotLedUp, Start, WhyNotCommanded, WhyNotLedUp};
 pub use contradiction::Contradiction;
 pub use fall::{Fall, Glimpse};
 pub use families::Families;
 pub use family::{Family, HALTS};
+pub use given::NotGiven;
 pub use guard::Forbidden;
 pub use halt::{After, Halt, LastLook, NotHalted, Order, Tries, Why};
 pub use harm::What;
 pub use identify::{Certainty, Identification, Reason, identify};
 pub use look::{Look, Looks};
+pub use parameters::{Beyond, Held, InForce, NotKept, NotPlanned, WhyNotKept, WhyNotPlanned};
+pub use prepare::NotPrepared;
 pub use ready::{Ignores, NotReady};
 pub use record::{Record, Sent};
 pub use rule::{Rule, WhyNot};
@@ -127,6 +141,7 @@ pub use settled::NotSettled;
 pub use speed::{Frequencies, Ramp, STANDSTILL, Speeds};
 pub use taken::Taken;
 pub use unit::Unit;
+pub use values::{NotRead, Values};
 pub use writing::{NotWritten, Words};
 
 /// The examples of the README are tests.

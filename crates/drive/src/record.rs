@@ -1,6 +1,7 @@
-//! What was sent to a unit, and what it said of itself: one memory, which all handles of the unit share.
+//! What was sent to a unit, what it said of itself, and where its parameters were written: one memory, which all handles of the
+//! unit share.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use drivebus_drives::State;
@@ -16,6 +17,10 @@ struct Kept {
     sent: Sent,
     /// What it said, by the name of the family in whose words it was asked.
     identities: BTreeMap<String, Identity>,
+    /// Parameters that were written to RAM, by code, and not to EEPROM since.
+    in_ram: BTreeSet<String>,
+    /// How often each parameter was written to EEPROM.
+    stores: BTreeMap<String, u64>,
 }
 
 /// What was sent to a unit that moves its motor.
@@ -58,6 +63,30 @@ impl Record {
         }
     }
 
+    /// Whether the parameter of this code was written to RAM, and not to EEPROM since: what it reads as is then not stored.
+    pub fn is_in_ram(&self, code: &str) -> bool {
+        self.kept().in_ram.contains(code)
+    }
+
+    /// The parameter of this code is about to be written to RAM: the drive may take it although its answer is lost.
+    pub fn put_in_ram(&self, code: &str) {
+        self.kept().in_ram.insert(code.to_owned());
+    }
+
+    /// The parameter of this code was written to EEPROM. How often that was, this time included.
+    pub fn stored(&self, code: &str) -> u64 {
+        let mut kept = self.kept();
+        kept.in_ram.remove(code);
+        let times = kept.stores.entry(code.to_owned()).or_default();
+        *times += 1;
+        *times
+    }
+
+    /// How often the parameter of this code was written to EEPROM.
+    pub fn stores(&self, code: &str) -> u64 {
+        self.kept().stores.get(code).copied().unwrap_or_default()
+    }
+
     fn kept(&self) -> MutexGuard<'_, Kept> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -78,5 +107,15 @@ mod tests {
         // Another family asks otherwise, and behind another port another unit may answer.
         assert!(!other.identity("vfd500", 0).is_sure(0));
         assert!(!other.identity("gd350", 1).is_sure(1));
+    }
+
+    #[test]
+    fn a_parameter_is_in_ram_until_it_is_stored() {
+        let record = Record::default();
+        record.put_in_ram("P00.11");
+        assert!(record.clone().is_in_ram("P00.11") && !record.is_in_ram("P00.12"));
+        assert_eq!((record.stored("P00.11"), record.stored("P00.11")), (1, 2));
+        assert!(!record.is_in_ram("P00.11"));
+        assert_eq!((record.stores("P00.11"), record.stores("P00.12")), (2, 0));
     }
 }

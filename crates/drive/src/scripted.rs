@@ -1,5 +1,7 @@
 //! A unit for tests: it answers an operation by a script, and what was asked is kept.
 
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_drives::Place;
@@ -8,7 +10,14 @@ use proptest::prelude::*;
 
 use crate::families::Families;
 use crate::family::Family;
-use crate::task::{Cause, LineError, Link, Mailbox, Notice, Outcome, Read, Seen, Stamped, Step, Task, Wish, Write};
+use crate::look::Looks;
+use crate::record::Record;
+use crate::same_unit::SameUnit;
+use crate::speed::Speeds;
+use crate::taken::Taken;
+use crate::task::{
+    Cause, LineError, Link, Mailbox, Notice, Outcome, Payload, Read, Seen, Stamped, Step, Task, Wish, Write,
+};
 
 /// Who is asked.
 pub(crate) const UNIT: UnitAddress = UnitAddress::by_name(5);
@@ -90,6 +99,66 @@ pub(crate) fn zeros_but(words: &[(u16, u16)]) -> impl FnMut(Read) -> Reply + '_ 
         let word = words.iter().find(|(address, _)| Place::from(*address) == read.place);
         Ok(word.map_or(0, |&(_, word)| word))
     }
+}
+
+/// A unit that shows what was written to it, as one of a family does.
+pub(crate) struct Keeper {
+    family: Arc<Family>,
+    /// What it has where that is not 0, by the plain places.
+    pub(crate) words: BTreeMap<Place, u16>,
+    /// What becomes of the first writes; each other one is confirmed.
+    pub(crate) confirms: VecDeque<Result<(), Fault>>,
+}
+
+impl Keeper {
+    pub(crate) fn new(family: &Arc<Family>, words: &[(u16, u16)]) -> Self {
+        let words = words.iter().map(|&(address, word)| (Place::from(address), word)).collect();
+        Self { family: Arc::clone(family), words, confirms: VecDeque::new() }
+    }
+}
+
+impl Unit for Keeper {
+    fn read(&mut self, read: Read, _: Instant) -> Reply {
+        match self.words.get(&read.place) {
+            Some(&word) => Ok(word),
+            None => like(&self.family, &[])(read),
+        }
+    }
+
+    fn write(&mut self, write: &Write, _: Instant) -> Result<(), Fault> {
+        self.confirms.pop_front().unwrap_or(Ok(()))?;
+        let first = self.family.profile().stored_address(write.place).unwrap_or(write.place.address);
+        for (address, word) in (first..).zip(words_of(write)) {
+            self.words.insert(Place { address, ..write.place }, word);
+        }
+        Ok(())
+    }
+}
+
+/// The words that `write` carries.
+pub(crate) fn words_of(write: &Write) -> Vec<u16> {
+    match &write.payload {
+        Payload::Word(word) => vec![*word],
+        Payload::Words(words) => words.clone(),
+    }
+}
+
+/// A call to the unit as one of `family`, of whose words all are trusted where that `is_trusted`.
+pub(crate) fn call(family: &Arc<Family>, record: &Record, is_trusted: bool) -> crate::Unit {
+    let same = SameUnit::new(UNIT, family, &record.identity(family.name(), 0), false);
+    call_as(same, record, is_trusted)
+}
+
+/// A call to the unit that is meant by its name, whatever it says.
+pub(crate) fn call_meant(family: &Arc<Family>, record: &Record, is_trusted: bool) -> crate::Unit {
+    let same = SameUnit::new(UNIT, family, &record.identity(family.name(), 0), true);
+    call_as(same, record, is_trusted)
+}
+
+fn call_as(same: SameUnit, record: &Record, is_trusted: bool) -> crate::Unit {
+    let profile = Arc::clone(same.family().profile());
+    let looks = Arc::new(Looks::new(&profile, is_trusted));
+    crate::Unit::new(Taken::as_named(same, &looks, &Arc::new(Speeds::new(&profile, is_trusted))), record)
 }
 
 /// The line of one test: its time, how often it was opened again, and what was asked.
@@ -176,6 +245,11 @@ impl Script {
         }
     }
 
+    /// Where was written to, and which words, in their order.
+    pub(crate) fn written(&self) -> Vec<(u32, Vec<u16>)> {
+        self.sent.iter().map(|(_, write)| (write.place.number(), words_of(write))).collect()
+    }
+
     /// The places that were asked for, in their order.
     pub(crate) fn places(&self) -> Vec<u32> {
         self.asked.iter().map(|read| read.place.number()).collect()
@@ -187,8 +261,8 @@ fn since_start(moment: Instant) -> Duration {
 }
 
 /// The shipped family of this name.
-pub(crate) fn shipped(name: &str) -> std::sync::Arc<Family> {
-    std::sync::Arc::clone(Families::shipped().named(name).unwrap())
+pub(crate) fn shipped(name: &str) -> Arc<Family> {
+    Arc::clone(Families::shipped().named(name).unwrap())
 }
 
 /// Any way to answer.
@@ -214,6 +288,6 @@ pub(crate) fn any_confirmation() -> impl Strategy<Value = Result<(), Fault>> {
 }
 
 /// Any shipped family.
-pub(crate) fn any_family() -> impl Strategy<Value = std::sync::Arc<Family>> {
+pub(crate) fn any_family() -> impl Strategy<Value = Arc<Family>> {
     proptest::sample::select(Families::shipped().iter().cloned().collect::<Vec<_>>())
 }

@@ -123,7 +123,6 @@ impl Unit {
 
     /// The register that takes the frequency.
     pub(crate) fn frequency_register(&self) -> Option<&Entry> {
-        let role = self.profile().setpoints().get(&Setpoint::Frequency)?;
-        self.profile().find(&role.register).ok()
+        self.register_of(Setpoint::Frequency)
     }
 }

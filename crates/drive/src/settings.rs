@@ -61,6 +61,17 @@ impl Unit {
         self.settings(line, needs_of(self.profile(), setpoint).to_vec()).await
     }
 
+    /// Those of the settings that `setpoint` needs which are not known to be as they must be: with them the drive would ignore it.
+    pub(crate) async fn unheeded<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        setpoint: Setpoint,
+    ) -> Result<Vec<Setting>, E> {
+        let mut settings = self.heeds(line, setpoint).await?;
+        settings.retain(|setting| !setting.is_right());
+        Ok(settings)
+    }
+
     /// Which settings keep the drive from taking commands from the bus; none where none is known to, or none tells.
     pub(crate) async fn ignores_commands<E: LineError>(&self, line: &Mailbox<E>) -> Result<Vec<Setting>, E> {
         let wanted = self.sure(wanted_of_commands(self.profile()));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use drivebus_drives::{Entry, Place, Profile, Value};
+use drivebus_drives::{Entry, Place, Profile, Setpoint, Value};
 use drivebus_rtu::UnitAddress;
 
 use crate::family::Family;
@@ -99,6 +99,12 @@ impl Unit {
     /// Whether nothing of its state may be read.
     pub(crate) fn is_blind(&self) -> bool {
         self.taken.is_blind()
+    }
+
+    /// The register that takes `setpoint`; `None` where the family has none that is known.
+    pub(crate) fn register_of(&self, setpoint: Setpoint) -> Option<&Entry> {
+        let role = self.profile().setpoints().get(&setpoint)?;
+        self.profile().find(&role.register).ok()
     }
 
     /// Looks at it, and tells what was seen.

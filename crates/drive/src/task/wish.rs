@@ -62,6 +62,7 @@ impl fmt::Display for Wish {
             Self::Tell(Notice::Saw(look)) => write!(f, "to tell that a look showed {look}"),
             Self::Tell(Notice::Shows(state)) => write!(f, "to tell that the state is {}", state.name()),
             Self::Tell(Notice::Starts(command)) => write!(f, "to tell that {} is about to be sent", command.name()),
+            Self::Tell(Notice::Stored { name, times }) => write!(f, "to tell that {name} was stored {times} times"),
         }
     }
 }
@@ -220,6 +221,13 @@ pub enum Notice {
     Shows(State),
     /// This start is about to be sent: what ends it must be able to, from now on.
     Starts(Command),
+    /// The parameter of this code was written to EEPROM once more, whose write life is limited: so often that it looks like a loop.
+    Stored {
+        /// Its code.
+        name: String,
+        /// How often it was, over this record.
+        times: u64,
+    },
 }
 
 /// How well a unit could be reached: its last exchanges, ten at most. A refusal is an answer, too.

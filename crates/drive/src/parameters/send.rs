@@ -1,0 +1,116 @@
+//! Writes that are allowed, on their way: alone or by one request, and what is remembered of where they are kept.
+
+use drivebus_drives::Store;
+
+use super::not_kept::{InForce, WhyNotKept};
+use super::plan::Planned;
+use crate::families::Families;
+use crate::task::{LineError, Mailbox, Notice, Payload, Read};
+use crate::unit::Unit;
+use crate::writing::{NotWritten, Words};
+
+type Why<E> = WhyNotKept<E>;
+
+/// EEPROM writes of one parameter that are taken for use; more look like a loop.
+const STORES_BEFORE_NOTICE: u64 = 5;
+
+impl Unit {
+    /// Sends the writes of `run`, whose addresses follow each other, by one request; to EEPROM only what that has not, by as few
+    /// requests as it takes. `done` gets the names of what the drive then has.
+    pub(crate) async fn keep<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        families: &Families,
+        run: &[Planned<'_>],
+        store: Store,
+        done: &mut Vec<String>,
+    ) -> Result<(), Why<E>> {
+        if store == Store::Ram || !run.iter().all(Planned::is_parameter) {
+            for item in run.iter().filter(|item| item.is_parameter()) {
+                self.record().put_in_ram(item.key());
+            }
+            return self.send_run(line, families, run, true, done).await;
+        }
+        // What is read is what is in force. It tells about EEPROM only if RAM was not written since.
+        let words = self.words_of(line, run).await.map_err(Why::Failed)?;
+        let (mut from, mut is_told) = (0, true);
+        for (at, (item, word)) in run.iter().zip(words).enumerate() {
+            if word == item.word && !self.record().is_in_ram(item.key()) {
+                self.store(line, families, &run[from..at], is_told, done).await?;
+                done.push(item.name.to_owned());
+                (from, is_told) = (at + 1, true);
+            } else {
+                is_told &= word != item.word;
+            }
+        }
+        self.store(line, families, &run[from..], is_told, done).await
+    }
+
+    /// Writes `run` to EEPROM; whether reading would tell that EEPROM took it, `is_told` says: what is in force already, from
+    /// RAM, reads the same in any case.
+    async fn store<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        families: &Families,
+        run: &[Planned<'_>],
+        is_told: bool,
+        done: &mut Vec<String>,
+    ) -> Result<(), Why<E>> {
+        if run.is_empty() {
+            return Ok(());
+        }
+        self.send_run(line, families, run, is_told, done).await?;
+        for item in run {
+            let times = self.record().stored(item.key());
+            if times >= STORES_BEFORE_NOTICE {
+                let name = item.key().to_owned();
+                line.taken_for(self.family()).tell(Notice::Stored { name, times }).await;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends `run` by one request, whose confirmation is looked for by reading where that `is_told` by it.
+    async fn send_run<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        families: &Families,
+        run: &[Planned<'_>],
+        is_told: bool,
+        done: &mut Vec<String>,
+    ) -> Result<(), Why<E>> {
+        let Some(first) = run.first() else { return Ok(()) };
+        let read_back = self.profile().read_back(&first.entry).filter(|_| is_told).map(|place| place.address);
+        let payload = match run {
+            [one] => Payload::Word(one.word),
+            several => Payload::Words(several.iter().map(|item| item.word).collect()),
+        };
+        // A drive that says that it is busy may have begun to do what it was told.
+        let acts = self.profile().acting().any(|entry| entry.name() == first.key());
+        let words = Words { is_absolute: !acts, ..Words::value(first.place, payload, read_back) };
+        let names = run.iter().map(|item| item.name.to_owned());
+        let Err(why) = self.write(line, families, &words).await else {
+            done.extend(names);
+            return Ok(());
+        };
+        // Whether a drive takes none of the words then, or those before the wrong one, is not printed.
+        let is_open = run.len() > 1 && matches!(&why, NotWritten::Failed(error) if error.cause().is_refusal());
+        let in_force = if is_open { Some(self.in_force(line, run).await) } else { None };
+        Err(Why::NotWritten { names: names.collect(), why, in_force })
+    }
+
+    async fn in_force<E: LineError>(&self, line: &Mailbox<E>, run: &[Planned<'_>]) -> InForce<E> {
+        match self.words_of(line, run).await {
+            Ok(words) => InForce::Shown(run.iter().zip(words).map(|(item, word)| item.held(word)).collect()),
+            Err(error) => InForce::Unread(error),
+        }
+    }
+
+    /// What the drive has of `run`, by one read.
+    async fn words_of<E>(&self, line: &Mailbox<E>, run: &[Planned<'_>]) -> Result<Vec<u16>, E> {
+        // What may be written has an address, and what shares a request fits into one.
+        let first = run.first().and_then(|item| item.entry.place());
+        let Some((first, count)) = first.zip(u16::try_from(run.len()).ok()) else { return Ok(Vec::new()) };
+        line.taken_for(self.family()).read(Read::words(self.address(), first, count)).await
+    }
+}

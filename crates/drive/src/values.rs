@@ -1,0 +1,82 @@
+//! Values of registers and parameters, read by name in the fewest requests, with everything settled that decides their meaning.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use drivebus_drives::{NameError, Profile, ReadPlan, Value};
+use thiserror::Error;
+
+use crate::settled::NotSettled;
+use crate::task::{LineError, Mailbox, Read};
+use crate::unit::Unit;
+
+/// Values that were read, and when.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Values {
+    /// The values, in the order of their names.
+    pub values: Vec<Value>,
+    /// What the words mean, as the drive is set: units and choices are in it.
+    pub profile: Arc<Profile>,
+    /// When the first was asked for, in Unix time; zero where nothing was.
+    pub asked: Duration,
+    /// When the last answer was complete.
+    pub answered: Duration,
+}
+
+/// Why values were not read. The unit was only asked. `E` is the error of whoever drives.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum NotRead<E> {
+    /// Nothing has that name.
+    #[error("{0}")]
+    Unknown(NameError),
+    /// It may not be read; with the reason.
+    #[error("{name} may not be read: {why}")]
+    MayNot {
+        /// What it was called.
+        name: String,
+        /// And why not.
+        why: String,
+    },
+    /// Nobody knows what it means.
+    #[error("{0}")]
+    NotSettled(NotSettled<E>),
+    /// The line failed, or the unit refused.
+    #[error("{0}")]
+    Failed(E),
+}
+
+impl Unit {
+    /// The values of `names`, in their order and in the fewest reads.
+    ///
+    /// # Errors
+    ///
+    /// [`NotRead`].
+    pub async fn read_values<E: LineError>(&self, line: &Mailbox<E>, names: &[&str]) -> Result<Values, NotRead<E>> {
+        for name in names {
+            let entry = self.profile().resolve(name).map_err(NotRead::Unknown)?;
+            let may_not = |why: String| NotRead::MayNot { name: (*name).to_owned(), why };
+            self.rule().read(&entry).map_err(|why| may_not(why.to_string()))?;
+        }
+        let unit = self.settled(line, names).await.map_err(NotRead::NotSettled)?;
+        let profile = unit.profile();
+        // They have names, and what may be read can be.
+        let entries: Vec<_> = names.iter().filter_map(|name| profile.resolve(name).ok()).collect();
+        let plan = profile.compile(&entries.iter().map(AsRef::as_ref).collect::<Vec<_>>()).ok();
+        let (mut came, mut asked, mut answered) = (Vec::new(), None, Duration::ZERO);
+        let line = line.taken_for(self.family());
+        for span in plan.iter().flat_map(ReadPlan::reads) {
+            let read = Read::words(self.address(), span.place(), span.count);
+            let stamped = line.read_stamped(read).await.map_err(NotRead::Failed)?;
+            asked.get_or_insert(stamped.asked);
+            answered = stamped.answered;
+            came.extend(stamped.words);
+        }
+        let values = plan.iter().flat_map(|plan| plan.values(&came)).filter_map(|(_, value)| value).collect();
+        Ok(Values { values, profile: Arc::clone(profile), asked: asked.unwrap_or_default(), answered })
+    }
+}
+
+#[cfg(test)]
+mod tests;
