@@ -70,7 +70,7 @@ pub enum NotSetBits<E> {
     /// The drive may not be started.
     #[error("{0}")]
     NotReady(NotReady<E>),
-    /// The drive takes it from elsewhere, or is not known to take it from the bus: what is not as it must be.
+    /// The drive takes it from elsewhere, or is not known to take it from the bus: all that it needs for that.
     #[error("the drive would ignore it: {}", told(.0))]
     Ignored(Vec<Setting>),
     /// What the other bits are may not be read; with the reason.
@@ -92,7 +92,7 @@ fn listed(choices: &BTreeMap<u16, String>) -> String {
 }
 
 fn told(settings: &[Setting]) -> String {
-    settings.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    settings.iter().filter(|setting| !setting.is_right()).map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
 /// What the fields of `register` are to be: each with its value, in the order of `given`.
@@ -174,9 +174,8 @@ impl Unit {
             // These words stand in for terminals, so the drive need not take its commands from the bus.
             unit.ready(line, false).await.map_err(NotSetBits::NotReady)?;
         }
-        let ignored = unit.unheeded(line, setpoint).await.map_err(NotSetBits::Failed)?;
-        if !ignored.is_empty() {
-            return Err(NotSetBits::Ignored(ignored));
+        if let Some(settings) = unit.unheeded(line, setpoint).await.map_err(NotSetBits::Failed)? {
+            return Err(NotSetBits::Ignored(settings));
         }
         // What can only be written tells nothing: there, what is not named is off.
         let held = if register.access() == Access::Wo {

@@ -19,7 +19,7 @@ pub enum NotGiven<E> {
     /// No register of the family is known that takes it.
     #[error("no such setpoint of this family is known")]
     NoRegister,
-    /// The drive takes it from elsewhere, or is not known to take it from the bus: what is not as it must be.
+    /// The drive takes it from elsewhere, or is not known to take it from the bus: all that it needs for that.
     #[error("the drive would ignore it: {}", told(.0))]
     Ignored(Vec<Setting>),
     /// What the drive is set to could not be read.
@@ -31,7 +31,7 @@ pub enum NotGiven<E> {
 }
 
 fn told(settings: &[Setting]) -> String {
-    settings.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    settings.iter().filter(|setting| !setting.is_right()).map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
 impl Unit {
@@ -54,9 +54,8 @@ impl Unit {
         let unit = settled.map_err(|why| not_kept(WhyNotKept::NotSettled(why)))?;
         let planned = unit.plan(name, value, Store::Ram);
         let planned = [planned.map_err(|why| not_kept(WhyNotKept::NotPlanned(why)))?];
-        let ignored = unit.unheeded(line, setpoint).await.map_err(NotGiven::Failed)?;
-        if !ignored.is_empty() {
-            return Err(NotGiven::Ignored(ignored));
+        if let Some(settings) = unit.unheeded(line, setpoint).await.map_err(NotGiven::Failed)? {
+            return Err(NotGiven::Ignored(settings));
         }
         unit.check_now(line, &planned).await.map_err(not_kept)?;
         let mut done = Vec::new();

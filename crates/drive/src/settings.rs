@@ -61,15 +61,14 @@ impl Unit {
         self.settings(line, needs_of(self.profile(), setpoint).to_vec()).await
     }
 
-    /// Those of the settings that `setpoint` needs which are not known to be as they must be: with them the drive would ignore it.
+    /// All that `setpoint` needs, where not each of it is known to be as it must be: then the drive would ignore it.
     pub(crate) async fn unheeded<E: LineError>(
         &self,
         line: &Mailbox<E>,
         setpoint: Setpoint,
-    ) -> Result<Vec<Setting>, E> {
-        let mut settings = self.heeds(line, setpoint).await?;
-        settings.retain(|setting| !setting.is_right());
-        Ok(settings)
+    ) -> Result<Option<Vec<Setting>>, E> {
+        let settings = self.heeds(line, setpoint).await?;
+        Ok((!settings.iter().all(Setting::is_right)).then_some(settings))
     }
 
     /// Which settings keep the drive from taking commands from the bus; none where none is known to, or none tells.

@@ -144,13 +144,16 @@ fn holds(case: &Case, outcome: &Came) {
         assert!(!profile.is_command(place), "{} can move the motor", entry.name());
         assert!(entry.access() != Access::Ro, "{} can only be read", entry.name());
         assert!(entry.verified() || case.is_trusted, "nothing proves {}", entry.name());
-        // What a parameter of the drive decides has a range of its own each.
-        if entry.quantity().variant().is_none() {
-            let value = entry.decode(word).to_f64();
-            let (low, high) = (entry.quantity().low(), entry.quantity().high());
-            assert!(low.is_none_or(|low| value >= low.to_f64()), "{} = {value}", entry.name());
-            assert!(high.is_none_or(|high| value <= high.to_f64()), "{} = {value}", entry.name());
-        }
+        // What a parameter of the drive decides is within one of the ranges that this may give it.
+        let variant = entry.quantity().variant().and_then(|name| profile.variants().get(name));
+        let chosen = variant.into_iter().flat_map(|variant| variant.choices.values().map(|choice| &choice.quantity));
+        let own = Some(entry.quantity()).filter(|_| variant.is_none());
+        let is_within = own.into_iter().chain(chosen).any(|quantity| {
+            let value = quantity.decode(word).to_f64();
+            quantity.low().is_none_or(|low| value >= low.to_f64())
+                && quantity.high().is_none_or(|high| value <= high.to_f64())
+        });
+        assert!(is_within, "{} = {word}", entry.name());
     }
     for (_, write) in &outcome.script.sent {
         let plain = profile.stored_address(write.place).map_or(write.place, Place::from);
