@@ -23,6 +23,7 @@ mod identify;
 mod look;
 mod mailbox;
 mod not_done;
+mod not_kept;
 mod open;
 mod overhear;
 mod plan;
@@ -43,6 +44,7 @@ mod tables;
 mod task;
 mod trace;
 mod unit;
+mod values;
 
 /// But for `ending`, nothing here keeps state outside its objects, and each of those locks for itself: safe without the GIL.
 #[pymodule(gil_used = false)]
@@ -104,6 +106,8 @@ mod _native {
     use crate::task::Task;
     #[pymodule_export]
     use crate::unit::Unit;
+    #[pymodule_export]
+    use crate::values::Values;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -40,7 +40,7 @@ pub(crate) fn not_written(py: Python<'_>, error: NotWritten<Failed>) -> PyResult
     ("not_written", written_told(py, error)?).into_py_any(py)
 }
 
-fn raised(py: Python<'_>, error: Failed) -> PyResult<Py<PyAny>> {
+pub(crate) fn raised(py: Python<'_>, error: Failed) -> PyResult<Py<PyAny>> {
     PyErr::from(error).into_value(py).into_py_any(py)
 }
 
@@ -68,7 +68,7 @@ fn why_not_commanded(py: Python<'_>, why: WhyNotCommanded<Failed>) -> PyResult<T
     })
 }
 
-fn ready_told(py: Python<'_>, why: NotReady<Failed>) -> PyResult<Told> {
+pub(crate) fn ready_told(py: Python<'_>, why: NotReady<Failed>) -> PyResult<Told> {
     Ok(match why {
         NotReady::MayNot(_) => ("may_not", py.None()),
         NotReady::Unseen(_) => ("unseen", py.None()),
@@ -109,7 +109,7 @@ fn set_told(py: Python<'_>, why: NotSet<Failed>) -> PyResult<Told> {
     })
 }
 
-fn settled_told(py: Python<'_>, why: NotSettled<Failed>) -> PyResult<Told> {
+pub(crate) fn settled_told(py: Python<'_>, why: NotSettled<Failed>) -> PyResult<Told> {
     Ok(match why {
         NotSettled::Unproved { variant, .. } => ("unproved", variant.into_py_any(py)?),
         NotSettled::Unreadable { variant, .. } => ("unreadable", variant.into_py_any(py)?),
@@ -119,7 +119,7 @@ fn settled_told(py: Python<'_>, why: NotSettled<Failed>) -> PyResult<Told> {
     })
 }
 
-fn written_told(py: Python<'_>, why: NotWritten<Failed>) -> PyResult<Told> {
+pub(crate) fn written_told(py: Python<'_>, why: NotWritten<Failed>) -> PyResult<Told> {
     Ok(match why {
         NotWritten::Failed(error) | NotWritten::NotSame(NotSame::Failed(error)) => ("failed", raised(py, error)?),
         NotWritten::NotSame(why) => ("not_same", checked(py, Err(why))?),

@@ -24,6 +24,21 @@ impl Record {
         Identity(self.0.identity(family, connection))
     }
 
+    #[pyo3(signature = (code, /))]
+    fn is_in_ram(&self, code: &str) -> bool {
+        self.0.is_in_ram(code)
+    }
+
+    #[pyo3(signature = (code, /))]
+    fn put_in_ram(&self, code: &str) {
+        self.0.put_in_ram(code);
+    }
+
+    #[pyo3(signature = (code, /))]
+    fn stored(&self, code: &str) -> u64 {
+        self.0.stored(code)
+    }
+
     #[getter]
     fn starts(&self) -> u64 {
         self.0.sent().starts

@@ -148,6 +148,9 @@ impl Task {
             Step::Wish(Wish::Tell(Notice::Starts(command))) => Ok(("starts", command.name().into_bound_py_any(py)?)),
             Step::Wish(Wish::Tell(Notice::Took(command))) => Ok(("took", command.name().into_bound_py_any(py)?)),
             Step::Wish(Wish::Tell(Notice::Saw(look))) => Ok(("saw", shown(look).into_bound_py_any(py)?)),
+            Step::Wish(Wish::Tell(Notice::Stored { name, times })) => {
+                Ok(("stored", (name, times).into_bound_py_any(py)?))
+            }
             Step::Wish(wish) => Err(unknown(&wish)),
         }
     }

@@ -18,7 +18,7 @@ use crate::task::{Failed, Task};
 /// One call to a unit; see `python/drivebus/_native.pyi`.
 #[pyclass(name = "Unit", frozen, module = "drivebus._native")]
 #[derive(Debug)]
-pub(crate) struct Unit(drive::Unit);
+pub(crate) struct Unit(pub(crate) drive::Unit);
 
 /// A word, or several.
 #[derive(FromPyObject)]
@@ -156,7 +156,7 @@ impl Unit {
     }
 }
 
-fn setpoint_of(name: &str) -> PyResult<Setpoint> {
+pub(crate) fn setpoint_of(name: &str) -> PyResult<Setpoint> {
     let known = Setpoint::ALL.into_iter().find(|setpoint| setpoint.name() == name);
     known.ok_or_else(|| bad_argument(format!("setpoint {name:?} is none")))
 }
@@ -165,7 +165,7 @@ fn none(py: Python<'_>) -> PyResult<Py<PyAny>> {
     is_done(py, ())
 }
 
-fn is_done<'py>(py: Python<'py>, value: impl IntoPyObject<'py>) -> PyResult<Py<PyAny>> {
+pub(crate) fn is_done<'py>(py: Python<'py>, value: impl IntoPyObject<'py>) -> PyResult<Py<PyAny>> {
     let value = value.into_bound_py_any(py)?;
     ("done", value).into_py_any(py)
 }
