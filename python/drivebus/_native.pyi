@@ -21,6 +21,7 @@ __version__: Final[str]
 __all__ = [
     "FALL_PATIENCE",
     "HALT_WITHIN",
+    "STORES_BEFORE_NOTICE",
     "STANDSTILL",
     "Asked",
     "Batch",
@@ -45,6 +46,7 @@ __all__ = [
     "Sniffer",
     "Task",
     "Unit",
+    "Values",
     "__version__",
     "all_frames_in",
     "begin_of_child",
@@ -87,6 +89,7 @@ FALL_PATIENCE: Final[float]
 a hundredth of a hertz in that time."""
 
 HALT_WITHIN: Final[float]
+STORES_BEFORE_NOTICE: Final[int]
 """Seconds for which a halt is sent that is not taken, where nothing else is said."""
 
 STANDSTILL: Final[float]
@@ -661,7 +664,7 @@ class Task:
             `"read"` or `"stamped"` and the arguments of a `drivebus.line.asking.Read`; `"write"` and those of a
             `drivebus.line.asking.Write`; `"sleep"` and seconds of the line's clock; `"link"` or `"halts"` and a unit;
             the notice `"took"` and a command that the unit took, `"saw"` and what `Looks.look` comes to, `"shows"` and
-            a state, or `"starts"` and a command that is about to be sent; or `"done"` and the result.
+            a state, `"stored"`, a code and how often that was written, or `"starts"` and a command that is about to be sent; or `"done"` and the result.
 
         Raises:
             DrivebusError: It failed; an error of the line that it does not handle comes back as it was given.
@@ -681,6 +684,12 @@ class Record:
     def __new__(cls) -> Record: ...
     def identity(self, family: str, connection: int, /) -> Identity:
         """What it said in the words of *family*, over *connection*, the `reconnects` of the line; nothing at first."""
+    def is_in_ram(self, code: str, /) -> bool:
+        """Whether the parameter *code* was written to RAM, and not to EEPROM since."""
+    def put_in_ram(self, code: str, /) -> None:
+        """The parameter *code* is about to be written to RAM."""
+    def stored(self, code: str, /) -> int:
+        """The parameter *code* was written to EEPROM. How often that was."""
     @property
     def starts(self) -> int:
         """How many starts were sent, or were about to be."""
@@ -770,6 +779,38 @@ class Unit:
     def heeds(self, setpoint: str, /) -> Task:
         """What must be set so that the drive heeds *setpoint*: settings."""
 
+class Values:
+    """The values of a unit as one call to it writes them, by name.
+
+    The result of each task is `"done"` and what it says; or a kind of reason, and what is told of it, which is a kind
+    and what is told of that again, as of `Unit`, and besides:
+
+    `"not_kept"` has the names that were written before, and the kind: `"not_planned"`, the name, a kind
+    (`"read_only"`, `"moves"`, `"may_not"`, `"only_stored"`, `"no_range"`, `"may_not_keep"`) and the word whose range is
+    not printed; `"decides"`, the name and another whose meaning it decides; `"unsays"`, the name, a variant and what
+    that was said to be; `"not_settled"`; `"running"`, names and the state; `"beyond"`, a name with its value and unit,
+    the same of its limit, and whether it is below; `"not_written"`, the names of the request, why, and None or what is
+    in force: `"shown"` and names with their values and units, or `"unread"` and the error; `"failed"` and the error.
+
+    `"not_prepared"`: `"no_setpoint"`; `"by_hand"` or `"may_not"` and a setting; `"not_kept"`; `"unshown"` and settings.
+    `"not_given"`: `"no_register"`; `"ignored"` and settings; `"not_kept"` without names. `"not_set_bits"`:
+    `"no_register"`, `"may_not"`, `"nothing_named"`, `"unreadable"`; `"no_field"`, the name and those that there are;
+    `"unfit"`, the name and what it can be, by number; `"unproved"` and the name; `"not_ready"`; `"ignored"` and
+    settings; `"not_written"`.
+    """
+
+    def __new__(cls, unit: Unit, /) -> Values:
+        """Those of *unit*."""
+    def write(self, wanted: Sequence[tuple[str, object]], store: bool, /) -> Task:
+        """Writes values, to EEPROM where *store*. Or `"not_kept"`."""
+    def prepare(self, setpoint: str, store: bool, /) -> Task:
+        """Sets the drive to obey the bus, and to take *setpoint* from it: settings. Or `"not_prepared"`."""
+    def give_setpoint(self, setpoint: str, value: float, /) -> Task:
+        """Gives a setpoint, if the drive heeds it. Or `"not_given"`."""
+    def set_bits(self, setpoint: str, fields: Sequence[tuple[str, bool | int | str]], force: bool, /) -> Task:
+        """Sets bits of a word, over a bad link too where *force*. Or `"not_set_bits"`, `"not_commanded"`."""
+
+@final
 class Halt:
     """One unit that is to be halted: sent until it takes it, and proved.
 

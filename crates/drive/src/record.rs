@@ -40,6 +40,9 @@ pub struct Sent {
 }
 
 impl Record {
+    /// EEPROM writes of one parameter that are taken for use; more look like a loop.
+    pub const STORES_BEFORE_NOTICE: u64 = 5;
+
     /// What was sent.
     pub fn sent(&self) -> Sent {
         self.kept().sent

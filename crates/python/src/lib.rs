@@ -17,6 +17,7 @@ mod family;
 mod format;
 mod frames;
 mod gateway;
+mod given;
 mod guard;
 mod halt;
 mod identify;
@@ -112,6 +113,7 @@ mod _native {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("FALL_PATIENCE", drivebus_drive::Fall::PATIENCE.as_secs_f64())?;
+        module.add("STORES_BEFORE_NOTICE", drivebus_drive::Record::STORES_BEFORE_NOTICE)?;
         module.add("HALT_WITHIN", drivebus_drive::Order::WITHIN.as_secs_f64())?;
         module.add("STANDSTILL", drivebus_drive::STANDSTILL)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))

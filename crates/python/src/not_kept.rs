@@ -1,16 +1,15 @@
-//! Why values were not written to a unit or read from it, for Python: of which kind the reason is, and what of it Python words.
+//! Why values were not written to a unit, for Python: of which kind the reason is, and what of it Python words.
 
 use drivebus_drive::{
-    Beyond, Held, InForce, NotGiven, NotKept, NotPlanned, NotPrepared, NotRead, NotSetBits, WhyNotKept, WhyNotPlanned,
+    Beyond, Held, InForce, NotGiven, NotKept, NotPlanned, NotPrepared, NotSetBits, WhyNotKept, WhyNotPlanned,
 };
 use drivebus_drives::Value;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
 use crate::errors::refuse;
-use crate::not_done::{Told, not_commanded, raised, ready_told, settled_told, written_told};
+use crate::not_done::{Told, not_commanded, raised, ready_told, setting, settled_told, written_told};
 use crate::task::{Failed, unknown};
-use crate::unit::setting;
 
 pub(crate) fn not_kept(py: Python<'_>, error: NotKept<Failed>) -> PyResult<Py<PyAny>> {
     ("not_kept", not_kept_told(py, error)?).into_py_any(py)
@@ -63,17 +62,6 @@ pub(crate) fn not_set_bits(py: Python<'_>, why: NotSetBits<Failed>) -> PyResult<
         why => return Err(unknown(&why)),
     };
     ("not_set_bits", told).into_py_any(py)
-}
-
-pub(crate) fn not_read(py: Python<'_>, why: NotRead<Failed>) -> PyResult<Py<PyAny>> {
-    let told: Told = match why {
-        NotRead::Unknown(error) => return Err(refuse(error)),
-        NotRead::MayNot { name, .. } => ("may_not", name.into_py_any(py)?),
-        NotRead::NotSettled(why) => ("not_settled", settled_told(py, why)?.into_py_any(py)?),
-        NotRead::Failed(error) => return Err(error.into()),
-        why => return Err(unknown(&why)),
-    };
-    ("not_read", told).into_py_any(py)
 }
 
 /// What was written before, and of which kind the reason is.

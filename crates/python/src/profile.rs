@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use drivebus_drive::task::Payload;
-use drivebus_drives::{self as drives, Command, Entry, Input, Place, ProfileError, Setpoint, Store};
+use drivebus_drives::{self as drives, Command, Entry, Place, ProfileError, Setpoint, Store};
 use drivebus_rtu::{ExceptionCode, Meanings};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyString};
+use pyo3::types::PyDict;
 
 use crate::convert::{one_word, place_of, shown};
 use crate::errors::{bad_argument, refuse};
+use crate::given::Given;
 use crate::plan::Plan;
 use crate::tables::{self, known_as, number};
 
@@ -231,22 +232,7 @@ impl Profile {
     #[pyo3(signature = (name, value, /))]
     fn encode(&self, name: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<u16> {
         let entry = self.find(name)?;
-        // A switch is on or off. Anything else that is told True was meant for another name.
-        if value.is_instance_of::<PyBool>() && entry.quantity().high().is_none_or(|high| high.to_string() != "1") {
-            return Err(bad_argument(format!("{} = {}: not a number", entry.name(), shown(value))));
-        }
-        let word = if let Ok(float) = value.cast::<PyFloat>() {
-            entry.encode(float.extract::<f64>()?)
-        } else if let Ok(integer) = value.extract::<i64>() {
-            entry.encode(integer)
-        } else if value.is_instance_of::<PyString>() {
-            entry.encode(Input::Text(&text("value", value)?))
-        } else {
-            // Decimal, numpy's floats, integers of any size: what they print is what they are.
-            let digits = value.str().map_or_else(|_| shown(value), |digits| digits.to_string());
-            entry.encode(Input::Decimal(&digits))
-        };
-        word.map_err(refuse)
+        entry.encode(Given::of(&entry, value)?.input()).map_err(refuse)
     }
 
     #[pyo3(signature = (name, raw, /))]

@@ -1,62 +1,21 @@
-//! `Values` for Python: what one call writes to a unit and reads from it by name, and why not, as a kind and what Python words.
+//! `Values` for Python: what one call writes to a unit by name, and why not, as a kind and what Python words.
 
 use drivebus_drive::task::Mailbox;
 use drivebus_drive::{self as drive, Families, FieldInput, Setting};
-use drivebus_drives::{Input, Profile, Store};
+use drivebus_drives::{Input, Store};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyFloat, PyString};
 
-use crate::convert::shown;
-use crate::errors::bad_argument;
-use crate::not_kept::{not_given, not_kept, not_prepared, not_read, not_set_bits};
-use crate::tables::number;
+use crate::errors::refuse;
+use crate::given::Given;
+use crate::not_done::setting;
+use crate::not_kept::{not_given, not_kept, not_prepared, not_set_bits};
 use crate::task::{Failed, Task};
-use crate::unit::{Unit, is_done, setpoint_of, setting};
+use crate::unit::{Unit, is_done, setpoint_of};
 
 /// The values of a unit, as one call sees it; see `python/drivebus/_native.pyi`.
 #[pyclass(name = "Values", frozen, module = "drivebus._native")]
 #[derive(Debug)]
 pub(crate) struct Values(drive::Unit);
-
-/// A value, as Python gives it.
-enum Given {
-    Integer(i64),
-    Float(f64),
-    Text(String),
-    /// Decimal, numpy's floats, integers of any size: what they print is what they are.
-    Decimal(String),
-}
-
-impl Given {
-    fn of(profile: &Profile, name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let is_switch = |name| {
-            let entry = profile.resolve(name).ok()?;
-            Some(entry.quantity().high().is_some_and(|high| high.to_string() == "1"))
-        };
-        // A switch is on or off. Anything else that is told True was meant for another name.
-        if value.is_instance_of::<PyBool>() && is_switch(name) == Some(false) {
-            return Err(bad_argument(format!("{name} = {}: not a number", shown(value))));
-        }
-        Ok(if let Ok(float) = value.cast::<PyFloat>() {
-            Self::Float(float.extract()?)
-        } else if let Ok(integer) = value.extract() {
-            Self::Integer(integer)
-        } else if value.is_instance_of::<PyString>() {
-            Self::Text(value.extract()?)
-        } else {
-            Self::Decimal(value.str().map_or_else(|_| shown(value), |digits| digits.to_string()))
-        })
-    }
-
-    fn input(&self) -> Input<'_> {
-        match self {
-            Self::Integer(integer) => Input::Integer(*integer),
-            Self::Float(float) => Input::Float(*float),
-            Self::Text(text) => Input::Text(text),
-            Self::Decimal(digits) => Input::Decimal(digits),
-        }
-    }
-}
 
 /// What a field of a word is to be, as Python gives it.
 #[derive(FromPyObject)]
@@ -86,8 +45,10 @@ impl Values {
 
     #[pyo3(signature = (wanted, store, /))]
     fn write(&self, wanted: Vec<(String, Bound<'_, PyAny>)>, store: bool) -> PyResult<Task> {
+        let profile = self.0.profile();
         let given = |(name, value): (String, _)| {
-            let given = Given::of(self.0.profile(), &name, &value)?;
+            // Whoever writes it says what is no name.
+            let given = profile.resolve(&name).map_err(refuse).and_then(|entry| Given::of(&entry, &value))?;
             Ok((name, given))
         };
         let wanted = wanted.into_iter().map(given).collect::<PyResult<Vec<_>>>()?;
@@ -140,25 +101,6 @@ impl Values {
             unit.set_bits(&line, Families::shipped(), setpoint, &fields, force).await
         };
         Ok(self.task(work, told))
-    }
-
-    #[pyo3(signature = (names, /))]
-    fn read(&self, names: Vec<String>) -> Task {
-        let asked = names.clone();
-        let told = move |py: Python<'_>, done: Result<drive::Values, _>| match done {
-            Ok(came) => {
-                let known = asked.iter().filter_map(|name| came.profile.resolve(name).ok());
-                let values = known.zip(came.values).map(|(entry, value)| number(py, entry.quantity(), value).unbind());
-                let values: Vec<_> = values.collect();
-                let (started, ended) = (came.asked.as_secs_f64(), came.answered.as_secs_f64());
-                is_done(py, (values, came.profile.chosen().clone(), started, ended))
-            }
-            Err(why) => not_read(py, why),
-        };
-        let work = |unit: drive::Unit, line| async move {
-            unit.read_values(&line, &names.iter().map(String::as_str).collect::<Vec<_>>()).await
-        };
-        self.task(work, told)
     }
 }
 

@@ -15,7 +15,7 @@ from drivebus.backup.reading import Reader
 from drivebus.backup.rules import Rules
 from drivebus.backup.unread import Unread, refused
 from drivebus.errors import BadArgument, NotAllowed, Refused, WrongDrive
-from drivebus.operations import parameter_writes, raw_words, registers
+from drivebus.operations import kept, raw_words, registers
 from drivebus.operations.drive_view import DriveView
 
 __all__ = ["Progress", "origin_of", "take"]
@@ -113,7 +113,7 @@ async def take(unit: DriveView, path: Path | None, *, resume: bool, force: bool,
     total, done, steps = len(codes), len(raw), 0
 
     def taken(interrupted: bool) -> Backup:
-        in_ram = [code for code in raw if code in were_in_ram or parameter_writes.is_in_ram(unit, code)]
+        in_ram = [code for code in raw if code in were_in_ram or kept.is_in_ram(unit, code)]
         return Backup(origin, raw, unread, unit.profile, interrupted=interrupted, in_ram=in_ram)
 
     def keep() -> None:

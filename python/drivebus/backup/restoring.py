@@ -21,7 +21,7 @@ from drivebus.backup.rules import Rules
 from drivebus.backup.text import worded
 from drivebus.backup.writing import place, write
 from drivebus.errors import LINE_ERRORS, BadArgument, NotAllowed, NotReady, Refused, WrongDrive
-from drivebus.operations import parameter_writes, state
+from drivebus.operations import kept, state
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile.refusals import means
 
@@ -148,7 +148,7 @@ class Restore:
                 is_there = why.why != "not there"
                 self._results[code] = ("unread", f"not written, {why.why}: {why}") if is_there else ("missing", why)
             elif words.raw[code] == self._backup.raw[code] and (
-                self._to_ram(code) or not parameter_writes.is_in_ram(self._unit, code)
+                self._to_ram(code) or not kept.is_in_ram(self._unit, code)
             ):
                 self._results[code] = ("same", "")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivebus.errors import LINE_ERRORS, Refused, Unverified
-from drivebus.operations import parameter_writes, raw_words
+from drivebus.operations import kept, raw_words
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile.refusals import means
 
@@ -67,7 +67,7 @@ async def _put(unit: DriveView, code: str, address: int, word: int, *, store: bo
     """Writes the word of a parameter, and remembers to which memory."""
     known = unit.profile.describe(code)
     if not store:
-        parameter_writes.put_in_ram(unit, known)
+        kept.put_in_ram(unit, known)
     await raw_words.write(unit, address, word)
     if store:
-        parameter_writes.stored(unit, known)
+        kept.stored(unit, known)

@@ -6,7 +6,6 @@ a drive, a guard or a stop, asks here: two handles of one unit have one memory.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -33,8 +32,6 @@ class UnitRecord:
         last_state: The state that was seen last, in words, and when on the line's clock.
         shown: The state that was seen last, and the fault in words where it was in one.
         is_lost: Whether the line failed when it was asked last.
-        in_ram: Parameters that were written to RAM and not to EEPROM since: what they read as is then not stored.
-        stores: How often each parameter was written to EEPROM.
         started_under: The profile by which it was started last.
     """
 
@@ -45,8 +42,6 @@ class UnitRecord:
     last_state: tuple[str, float] | None = None
     shown: tuple[State, str | None] | None = None
     is_lost: bool = False
-    in_ram: set[str] = field(default_factory=set)
-    stores: Counter[str] = field(default_factory=Counter)
     started_under: Profile | None = None
 
     @property

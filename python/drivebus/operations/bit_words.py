@@ -6,14 +6,15 @@ never repeated, under the checks of a command.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from typing import Any
 
 from drivebus import _native, checks
-from drivebus.errors import BadArgument, NotAllowed
-from drivebus.operations import bus_control, not_commanded, not_ready, raw_words, setpoints
+from drivebus.errors import BadArgument, DrivebusError, NotAllowed
+from drivebus.operations import bus_control, not_commanded, not_ready, not_written, setpoints
 from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
-from drivebus.values import Description
+from drivebus.operations.explained import read_words
 
 __all__ = ["bits", "inputs", "outputs", "set_virtual_inputs", "set_virtual_outputs", "special_control"]
 
@@ -86,7 +87,7 @@ async def special_control(
 
 async def _word(unit: DriveView, name: str) -> int:
     unit.evidence.require_readable([name])
-    [word] = await raw_words.read_words(unit, unit.profile.address(name))
+    [word] = await read_words(unit, unit.profile.address(name))
     return word
 
 
@@ -103,43 +104,49 @@ async def _terminals(unit: DriveView, name: str) -> dict[str, bool]:
 
 
 async def _set_bits(unit: DriveView, setpoint: str, given: Mapping[str, object], force: bool) -> None:
-    register = setpoints.register_of(unit, setpoint)
-    unit.evidence.require_writable(register)
-    known, masks = unit.profile.describe(register), _masks(unit, register)
-    if not given:
-        raise BadArgument(f"nothing to set was named; {register} has {', '.join(masks) or 'no bits that are known'}")
-    wanted = [
-        (masks[checks.one_of(f"bit of {register}", name, list(masks))], _bits(known, name, value))
-        for name, value in given.items()
-    ]
-    for name in given:
-        unit.evidence.require_bits(register, name)
-    moves = unit.profile.is_command(unit.profile.address(register))
-    if moves:
-        not_ready.can_be_stopped(unit)
-        if not checks.flag("force", force):
-            await _check_ready(unit, _native.Unit.prove_link)
-        # These words stand in for terminals, so the drive need not take its commands from the bus.
-        await _check_ready(unit, lambda core: core.ready(False))
-    await bus_control.check_heeded(unit, setpoint, register)
-    # What can only be written tells nothing: there, what is not named is off.
-    word = 0 if known.access == "wo" else await _word(unit, register)
-    for mask, value in wanted:
-        word = (word & ~mask) | (value * (mask & -mask) & mask)
-    address = unit.profile.address(register)
-    if not moves:
-        await raw_words.write(unit, address, word, read_back=unit.profile.read_back(register))
-        return
-    kind, told = await call_core(unit, lambda core: core.write_moving(address, word))
-    if kind != "done":
+    setpoints.register_of(unit, setpoint)
+    force = checks.flag("force", force)
+    fields = [(name, _plain(value)) for name, value in given.items()]
+    kind, told = await call_core(unit, lambda core: _native.Values(core).set_bits(setpoint, fields, force))
+    if kind == "not_commanded":
         raise not_commanded.in_words(unit, *told, confirm=0.0)
-
-
-async def _check_ready(unit: DriveView, wanted: Callable[[_native.Unit], _native.Task]) -> None:
-    """Raises `NotAllowed` where the drive may not be started."""
-    kind, told = await call_core(unit, wanted)
     if kind != "done":
-        raise not_ready.in_words(unit, None, *told)
+        raise _not_set(unit, setpoint, given, *told)
+
+
+def _plain(value: object) -> bool | int | str:
+    """*value*, or the text of what no field can be."""
+    is_plain = isinstance(value, (bool, str)) or (isinstance(value, int) and 0 <= value <= 0xFFFF)
+    return value if is_plain else repr(value)  # type: ignore[return-value]
+
+
+def _not_set(unit: DriveView, setpoint: str, given: Mapping[str, object], kind: str, told: Any) -> DrivebusError:
+    """Why bits were not set: of *kind*, and what is *told* of it, as `_native.Values.set_bits` has it."""
+    register = setpoints.register_of(unit, setpoint)
+    if kind == "not_ready":
+        return not_ready.in_words(unit, None, *told)
+    if kind == "not_written":
+        return not_written.in_words(unit, *told)
+    if kind == "ignored":
+        return bus_control.ignored(unit, setpoint, register, told)
+    if kind == "unfit":
+        name, choices = told
+        allowed = ", ".join(f"{number} = {label}" for number, label in choices.items())
+        return BadArgument(f"{name} is {checks.shown(given[name])}, which {register} cannot be; allowed is {allowed}")
+    try:
+        if kind == "no_field":
+            name, known = told
+            checks.one_of(f"bit of {register}", name, known)
+        elif kind == "unproved":
+            unit.evidence.require_bits(register, told)
+        elif kind == "unreadable":
+            unit.evidence.require_readable([register])
+        else:
+            unit.evidence.require_writable(register)
+    except NotAllowed as error:
+        return error
+    known = ", ".join(_masks(unit, register)) or "no bits that are known"
+    return BadArgument(f"nothing to set was named; {register} has {known}")
 
 
 def _masks(unit: DriveView, name: str) -> dict[str, int]:
@@ -151,21 +158,3 @@ def _masks(unit: DriveView, name: str) -> dict[str, int]:
         for field in masks:
             masks[field] |= (told[field] != nothing[field]) << bit
     return masks
-
-
-def _bits(known: Description, name: str, value: object) -> int:
-    """*value* as the bits of the field *name*."""
-    choices = (known.bits or {}).get(name) or {0: "off", 1: "on"}
-    numbers = {label: number for number, label in choices.items()}
-    if isinstance(value, bool):
-        if len(choices) == 2:
-            return int(value)
-    elif isinstance(value, str):
-        if value in numbers:
-            return numbers[value]
-    elif isinstance(value, int):
-        called = numbers.get(f"{name} {value}", value)
-        if called in choices:
-            return called
-    allowed = ", ".join(f"{number} = {label}" for number, label in choices.items())
-    raise BadArgument(f"{name} is {checks.shown(value)}, which {known.name} cannot be; allowed is {allowed}")

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from drivebus import checks
+from drivebus import _native, checks
 from drivebus.advice import Advice, Text, argument, call
-from drivebus.errors import NotReady, Unconfirmed
-from drivebus.operations import parameter_writes, parameters, registers
+from drivebus.errors import DrivebusError, NotReady, Unconfirmed
+from drivebus.operations import not_kept, registers
 from drivebus.operations.by_name import by_name
 from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
@@ -20,7 +20,7 @@ from drivebus.operations.in_parts import in_parts
 from drivebus.profile.evidence import not_verified
 from drivebus.values import Control, ControlItem
 
-__all__ = ["check_control", "check_heeded", "item_of", "prepare_control"]
+__all__ = ["check_control", "ignored", "item_of", "prepare_control"]
 
 
 async def check_control(unit: DriveView, setpoint: str | None = None, *, unverified: bool = False) -> Control:
@@ -60,57 +60,56 @@ async def prepare_control(
     """
     store = checks.flag("store", store)
     unit = unit.trusting(unverified)
-    needed = {}
-    for row in await _settings(unit, setpoint):
-        item, by_hand = item_of(unit, row), row[-1]
-        if item.ok and not (store and parameter_writes.is_in_ram(unit, item.code)):
-            continue
-        if item.actual is not None and by_hand:
-            raise NotReady(
-                Text(
-                    f"{item.code} of unit {unit.address} is {int(item.actual)}, and must be {int(item.wanted)} "
-                    f"({item.label}). ",
-                    call("prepare_control"),
-                    f" does not set it: {item.note} Nothing was written. If {int(item.wanted)} is meant, ",
-                    call("write"),
-                    f" {item.code} first, with ",
-                    argument("store", True),
-                ),
-                why="settings",
-                unit=unit.address,
-            )
-        if item.actual is None or not (item.verified or unit.unverified):
-            what = f"setting {item.code} ({item.label}) of {unit.profile.title} to {int(item.wanted)}"
-            raise not_verified(what, item.note, unit.address)
-        needed[item.code] = item.wanted
-    if needed:
-        await parameters.write(unit, needed, store=store)
-    control = _shown(unit, await _settings(unit, setpoint))
-    if not control:
-        raise Unconfirmed(
-            f"unit {unit.address} took the settings and shows others:\n{control}",
-            unit=unit.address,
-        )
-    return control
+    _check_known(unit, setpoint)
+    wanted = setpoint or "frequency"
+    kind, told = await call_core(unit, lambda core: _native.Values(core).prepare(wanted, store))
+    if kind != "done":
+        raise _not_prepared(unit, *told, store=store)
+    return _shown(unit, told)
 
 
-async def check_heeded(unit: DriveView, setpoint: str, register: str) -> None:
-    """Raises `NotAllowed` if the drive would not heed *setpoint*, because it takes that from elsewhere."""
-    _, rows = await call_core(unit, lambda core: core.heeds(setpoint))
-    control = _shown(unit, rows)
-    if not control:
-        raise NotReady(
-            Text(
-                f"unit {unit.address} would ignore its {setpoint.replace('_', ' ')} setpoint:\n{control}\nNothing was "
-                "sent. ",
-                Advice("prepare_control", setpoint, f'prepare_control(setpoint="{setpoint}")'),
-                " sets it so; ",
-                Advice("write", register, f'write("{register}", …)'),
-                " writes it anyway",
-            ),
-            why="settings",
-            unit=unit.address,
+def _not_prepared(unit: DriveView, kind: str, told: Any, *, store: bool) -> DrivebusError:
+    """Why *unit* is not set to obey the bus: of *kind*, and what is *told* of it, as `_native.Values.prepare` has it."""
+    if kind == "not_kept":
+        done, *why = told
+        return not_kept.written_before(not_kept.in_words(unit, *why, store=store), done)
+    if kind == "unshown":
+        return Unconfirmed(
+            f"unit {unit.address} took the settings and shows others:\n{_shown(unit, told)}", unit=unit.address
         )
+    item = item_of(unit, told)
+    if kind == "may_not":
+        what = f"setting {item.code} ({item.label}) of {unit.profile.title} to {int(item.wanted)}"
+        return not_verified(what, item.note, unit.address)
+    return NotReady(
+        Text(
+            f"{item.code} of unit {unit.address} is {int(item.actual or 0)}, and must be {int(item.wanted)} "
+            f"({item.label}). ",
+            call("prepare_control"),
+            f" does not set it: {item.note} Nothing was written. If {int(item.wanted)} is meant, ",
+            call("write"),
+            f" {item.code} first, with ",
+            argument("store", True),
+        ),
+        why="settings",
+        unit=unit.address,
+    )
+
+
+def ignored(unit: DriveView, setpoint: str, register: str, rows: Iterable[Sequence[Any]]) -> NotReady:
+    """Why the drive would not heed *setpoint*: it takes that from elsewhere, as the settings in *rows* say."""
+    return NotReady(
+        Text(
+            f"unit {unit.address} would ignore its {setpoint.replace('_', ' ')} setpoint:\n{_shown(unit, rows)}\n"
+            "Nothing was sent. ",
+            Advice("prepare_control", setpoint, f'prepare_control(setpoint="{setpoint}")'),
+            " sets it so; ",
+            Advice("write", register, f'write("{register}", …)'),
+            " writes it anyway",
+        ),
+        why="settings",
+        unit=unit.address,
+    )
 
 
 def item_of(unit: DriveView, row: Sequence[Any]) -> ControlItem:
@@ -129,11 +128,15 @@ def item_of(unit: DriveView, row: Sequence[Any]) -> ControlItem:
 
 async def _settings(unit: DriveView, setpoint: str | None) -> list[Sequence[Any]]:
     """What must be set for *setpoint*, in the order in which to set it, and what is set, as the core tells it."""
-    if setpoint is not None:
-        checks.one_of("setpoint", setpoint, unit.profile.setpoint_names())
+    _check_known(unit, setpoint)
     _, rows = await call_core(unit, lambda core: core.control(setpoint or "frequency"))
     settings: list[Sequence[Any]] = rows
     return settings
+
+
+def _check_known(unit: DriveView, setpoint: str | None) -> None:
+    if setpoint is not None:
+        checks.one_of("setpoint", setpoint, unit.profile.setpoint_names())
 
 
 def _shown(unit: DriveView, settings: Iterable[Sequence[Any]]) -> Control:

@@ -15,9 +15,8 @@ from drivebus import _native, checks
 from drivebus.errors import BadArgument, DrivebusError, NotAllowed
 from drivebus.operations import (
     bus_control,
+    not_kept,
     not_written,
-    parameter_writes,
-    parameters,
     registers,
     unit_variants,
 )
@@ -160,12 +159,18 @@ async def write_setpoint(
         hz = checks.number("setpoint", value, 0.0)
         await _asked_for(unit, hz, lambda core: core.set_frequency(hz))
         return
-    unit = await with_setpoint(unit, name)
     register = register_of(unit, name)
-    planned = parameters.plan_write(unit, register, checks.number(name, value, -math.inf), False)
-    await bus_control.check_heeded(unit, name, register)
-    await parameters.check_now(unit, [planned])
-    await parameter_writes.write(unit, [planned], False)
+    value = checks.number(name, value, -math.inf)
+    kind, told = await call_core(unit, lambda core: _native.Values(core).give_setpoint(name, value))
+    if kind != "done":
+        raise _not_given(unit, name, register, *told)
+
+
+def _not_given(unit: DriveView, name: str, register: str, kind: str, told: Any) -> DrivebusError:
+    """Why *unit* was not given a setpoint: *kind* and *told* as `_native.Values.give_setpoint` has them."""
+    if kind == "ignored":
+        return bus_control.ignored(unit, name, register, told)
+    return not_kept.in_words(unit, *told)
 
 
 def _as_checked(unit: DriveView, name: str, checked: SetpointRange) -> DriveView:

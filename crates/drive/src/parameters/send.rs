@@ -5,14 +5,12 @@ use drivebus_drives::Store;
 use super::not_kept::{InForce, WhyNotKept};
 use super::plan::Planned;
 use crate::families::Families;
+use crate::record::Record;
 use crate::task::{LineError, Mailbox, Notice, Payload, Read};
 use crate::unit::Unit;
 use crate::writing::{NotWritten, Words};
 
 type Why<E> = WhyNotKept<E>;
-
-/// EEPROM writes of one parameter that are taken for use; more look like a loop.
-const STORES_BEFORE_NOTICE: u64 = 5;
 
 impl Unit {
     /// Sends the writes of `run`, whose addresses follow each other, by one request; to EEPROM only what that has not, by as few
@@ -62,7 +60,7 @@ impl Unit {
         self.send_run(line, families, run, is_told, done).await?;
         for item in run {
             let times = self.record().stored(item.key());
-            if times >= STORES_BEFORE_NOTICE {
+            if times >= Record::STORES_BEFORE_NOTICE {
                 let name = item.key().to_owned();
                 line.taken_for(self.family()).tell(Notice::Stored { name, times }).await;
             }
