@@ -21,8 +21,8 @@ __version__: Final[str]
 __all__ = [
     "FALL_PATIENCE",
     "HALT_WITHIN",
-    "STORES_BEFORE_NOTICE",
     "STANDSTILL",
+    "STORES_BEFORE_NOTICE",
     "Asked",
     "Batch",
     "Bus",
@@ -664,7 +664,8 @@ class Task:
             `"read"` or `"stamped"` and the arguments of a `drivebus.line.asking.Read`; `"write"` and those of a
             `drivebus.line.asking.Write`; `"sleep"` and seconds of the line's clock; `"link"` or `"halts"` and a unit;
             the notice `"took"` and a command that the unit took, `"saw"` and what `Looks.look` comes to, `"shows"` and
-            a state, `"stored"`, a code and how often that was written, or `"starts"` and a command that is about to be sent; or `"done"` and the result.
+            a state, `"stored"`, a code and how often that was written, or `"starts"` and a command that is about to be
+            sent; or `"done"` and the result.
 
         Raises:
             DrivebusError: It failed; an error of the line that it does not handle comes back as it was given.

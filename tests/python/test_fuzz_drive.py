@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fuzz.drive import drive
 
-from drivebus.operations import core_calls, motion, parameter_writes
+from drivebus.operations import core_calls, motion, parameters
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.halting import Halt
 
@@ -68,11 +68,12 @@ def test_a_coast_that_is_proved_by_nothing_is_found(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_write_that_is_reported_done_and_was_not_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    write = parameter_writes.write
+    write = parameters.write
 
-    async def loses(unit: DriveView, run: Sequence[parameter_writes.Planned], store: bool) -> None:
-        if all(item.raw <= MOST_AT_FIRST for item in run):
-            await write(unit, run, store)
+    async def loses(unit: DriveView, name: str | Mapping[str, object], value: object = None, **how: bool) -> None:
+        wanted = name if isinstance(name, Mapping) else {name: value}
+        if all(unit.profile.encode(each, given) <= MOST_AT_FIRST for each, given in wanted.items()):
+            await write(unit, wanted, **how)
 
-    monkeypatch.setattr(parameter_writes, "write", loses)
+    monkeypatch.setattr(parameters, "write", loses)
     assert any("was there" in said and "is;" in said for said in found())

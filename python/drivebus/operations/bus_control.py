@@ -69,7 +69,7 @@ async def prepare_control(
 
 
 def _not_prepared(unit: DriveView, kind: str, told: Any, *, store: bool) -> DrivebusError:
-    """Why *unit* is not set to obey the bus: of *kind*, and what is *told* of it, as `_native.Values.prepare` has it."""
+    """Why *unit* is not set to obey the bus: *kind* and *told* as `_native.Values.prepare` has them."""
     if kind == "not_kept":
         done, *why = told
         return not_kept.written_before(not_kept.in_words(unit, *why, store=store), done)
