@@ -84,8 +84,13 @@ lint: layers rust-lint types other-types $(if $(filter 12.%,$(shell cat /etc/deb
 machine:
 	@sh tools/check_machine.sh $(PYTHON) rust
 
-$(VENV)/.created: | machine
-	$(PYTHON) -m venv --clear $(VENV)
+# Without its pip it is there at once: cargo asks it for no more.
+$(VENV)/.python: | machine
+	$(PYTHON) -m venv --clear --without-pip $(VENV)
+	@touch $@
+
+$(VENV)/.created: $(VENV)/.python
+	$(BIN)/python -m ensurepip --default-pip >/dev/null
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1' 'maturin>=1.9.4,<2'
 	@touch $@
 
@@ -117,7 +122,7 @@ layers: $(VENV)/.created
 	$(BIN)/python tools/check_links.py
 	$(BIN)/python tools/check_model.py --texts
 
-rust-lint: $(VENV)/.created
+rust-lint: $(VENV)/.python
 	$(CARGO) fmt --check
 	$(CARGO) clippy $(LOCKED) --quiet --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc $(LOCKED) --quiet --no-deps --workspace
@@ -159,10 +164,9 @@ interop-parts:
 	@sh tools/debian_parts.sh
 
 # It needs older parts than drivebus is tested with.
-$(SCADA)/.installed: pyproject.toml
-	$(PYTHON) -m venv --clear $(SCADA)
-	$(SCADA)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
-	$(SCADA)/bin/python -m pip install --quiet --group scada
+$(SCADA)/.installed: pyproject.toml $(VENV)/.created
+	$(PYTHON) -m venv --clear --without-pip $(SCADA)
+	$(BIN)/python -m pip --python $(SCADA)/bin/python install --quiet --group scada
 	@touch $@
 
 # What pytest makes of each file takes longer than to import it; it is made once here, and not by each of those who run tests.
