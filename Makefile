@@ -224,7 +224,7 @@ bench: $(BENCH_PEERS)/.installed interop-parts ## writes benches/RESULTS.md
 
 # The tests of which `make test` runs a sample, whole; any test may go to any core.
 MATRIX := test_halts_of_other_families test_halts_awaited test_unconfirmed_writes test_halts_refused test_hal_refused \
-          test_panel_refused test_ends_beside_others test_ends_refused
+          test_panel_refused test_ends_beside_others test_ends_refused test_wrong_profile
 
 matrix: $(VENV)/.dev $(VENV)/.wheel ## some minutes; see tests/python/matrix.py
 	DRIVEBUS_MATRIX=all $(PYTEST) -q -n $(TEST_JOBS) $(MATRIX:%=tests/python/%.py)
