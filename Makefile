@@ -30,7 +30,7 @@ RUST_TESTED := --workspace --exclude drivebus-benches
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo docs try-docs test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
-        machine screens format schema types layers rust-lint other-types rust-build rust-test counts counts-update python-collect python-test beside-tests interop-parts examples wheel-smoke \
+        machine screens format schema types layers rust-lint other-types rust-build rust-test counts counts-update python-collect python-test beside-wheel beside-tests interop-parts examples wheel-smoke \
         pictures matrix semver sdist release-check release-readme archives publish-crates wheels wheels-check cross-check
 
 help: ## what can be made
@@ -64,17 +64,20 @@ demo: $(VENV)/.wheel
 	$(BIN)/drivebus demo
 
 # What is downloaded and built goes several at a time: a download, or the end of a link, leaves a core idle. No two of them need
-# the same lock: one target folder of cargo each, and one pip. Python's tests wait for lines half of their time: what computes
-# and can wait is done beside them, and gives way to them.
-AT_ONCE := $(MAKE) --no-print-directory --jobs=3
+# the same lock for long: one target folder of cargo each. Python's tests wait for lines half of their time, so they begin as
+# soon as the wheel and what they need is there; what computes and can wait is done beside all that, and gives way to it.
+AT_ONCE := $(MAKE) --no-print-directory --jobs=4
 test:
-	@$(AT_ONCE) rust-lint dist/.wheel $(VENV)/.dev $(SCADA)/.installed interop-parts
-	@$(AT_ONCE) python-test beside-tests
-	@$(MAKE) --no-print-directory rust-test examples wheel-smoke
+	@$(AT_ONCE) python-test beside-wheel beside-tests
+	@$(AT_ONCE) rust-test examples wheel-smoke
 	@echo "make test: every check passed"
 
-beside-tests: $(VENV)/.dev $(VENV)/.wheel
-	@nice -n 15 $(MAKE) --no-print-directory types layers rust-build counts
+beside-wheel: $(VENV)/.python
+	@nice -n 15 $(MAKE) --no-print-directory rust-lint
+	@nice -n 15 $(MAKE) --no-print-directory rust-build
+
+beside-tests: $(VENV)/.dev $(VENV)/.wheel interop-parts
+	@nice -n 15 $(MAKE) --no-print-directory types layers counts
 
 # What is for other systems is looked at here and not by `make test`, which has to be quick. The compiler for them is Debian 12's.
 lint: layers rust-lint types other-types $(if $(filter 12.%,$(shell cat /etc/debian_version 2>/dev/null)),cross-check)
@@ -108,8 +111,9 @@ dist/.wheel: $(RUST_SOURCES) $(PYTHON_SOURCES) $(VENV)/.created
 	$(BIN)/python tools/settle_wheel.py dist/drivebus-*.whl
 	@touch $@
 
-# Tests run against the wheel, so what is tested is what is shipped, and Rust is built for release once.
-$(VENV)/.wheel: dist/.wheel
+# Tests run against the wheel, so what is tested is what is shipped, and Rust is built for release once. Where both are wanted
+# it is installed last: two pips at once would write the same files.
+$(VENV)/.wheel: dist/.wheel | $(if $(filter python-%,$(MAKECMDGOALS)),$(VENV)/.dev)
 	$(BIN)/python -m pip install --quiet dist/drivebus-*.whl
 	$(BIN)/python -m pip install --quiet --force-reinstall --no-deps dist/drivebus-*.whl
 	@touch $@
@@ -143,7 +147,7 @@ other-types: $(VENV)/.dev $(VENV)/.wheel
 	$(BIN)/mypy --platform darwin --cache-dir .mypy_cache/darwin python/drivebus
 
 # What nextest runs is what cargo builds.
-rust-build: $(VENV)/.created
+rust-build: $(VENV)/.python
 	$(CARGO) test --no-run $(LOCKED) --quiet $(RUST_TESTED)
 
 rust-test: $(VENV)/.created
