@@ -178,7 +178,7 @@ CALLS: dict[str, Call] = {
 
 
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS.keys())
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(replies=REPLIES)
 @example(only(b""))
 @example(only(b"\x00"))
