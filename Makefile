@@ -30,7 +30,7 @@ RUST_TESTED := --workspace --exclude drivebus-benches
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo docs try-docs test lint bench conformance fuzz fuzz-corpus model schedules oldest packages soak soak-virtual soak-realtime wheel clean \
-        machine screens format schema types layers rust-lint other-types rust-build rust-test counts counts-update python-collect python-test beside-wheel beside-tests interop-parts examples wheel-smoke \
+        machine screens format schema types layers rust-lint rust-lint-rest other-types rust-build rust-test counts counts-update python-collect python-test beside-wheel beside-tests interop-parts examples wheel-smoke \
         pictures matrix semver sdist release-check release-readme archives publish-crates wheels wheels-check cross-check
 
 help: ## what can be made
@@ -80,7 +80,7 @@ beside-tests: $(VENV)/.dev $(VENV)/.wheel interop-parts
 	@nice -n 15 $(MAKE) --no-print-directory types layers counts
 
 # What is for other systems is looked at here and not by `make test`, which has to be quick. The compiler for them is Debian 12's.
-lint: layers rust-lint types other-types $(if $(filter 12.%,$(shell cat /etc/debian_version 2>/dev/null)),cross-check)
+lint: layers rust-lint rust-lint-rest types other-types $(if $(filter 12.%,$(shell cat /etc/debian_version 2>/dev/null)),cross-check)
 
 # --- what the machine must have, and the local environment -------------------------------------------------
 
@@ -133,6 +133,10 @@ layers: $(VENV)/.created
 rust-lint: $(VENV)/.python
 	$(CARGO) fmt --check
 	$(CARGO) clippy $(LOCKED) --quiet --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc $(LOCKED) --quiet --no-deps $(PUBLISHED:%=--package %)
+
+# Of crates that nobody publishes the pages are read by nobody, and `make test` has to be quick.
+rust-lint-rest: $(VENV)/.python
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc $(LOCKED) --quiet --no-deps --workspace
 
 types: $(VENV)/.dev $(VENV)/.wheel
