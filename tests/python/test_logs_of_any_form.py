@@ -111,7 +111,7 @@ NUMBERS = ["", "{} ", "{}: ", "#{} ", "{:04d} ", "({}) "]
 ENDS = ["", "   ", " (8 bytes)", " ; ok", "\r"]
 
 
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=200)
 @given(
     talk=st.lists(exchanges(), min_size=1, max_size=4),
     radix=st.sampled_from(sorted(RADICES)),
