@@ -26,6 +26,7 @@ __all__ = [
     "Machine",
     "cases",
     "own_halts",
+    "refusals",
     "sample",
     "set_going",
 ]
@@ -134,6 +135,18 @@ def sample(family: str, by: str) -> list[Case]:
         case
         for number, case in enumerate(every)
         if number % step == begin % step or (case.by, case.known) == ("command line", "identified")
+    ]
+
+
+def refusals(ends: list[str]) -> list[tuple[str, int, float]]:
+    """How a halt is refused at each of *ends*: by every exception, for times that take turns in the sample."""
+    whiles = (0.02, 0.5, 2.0, 5.0)
+    return [
+        (end, exception, seconds)
+        for number, end in enumerate(ends)
+        for exception in range(0x01, 0x0C)
+        for place, seconds in enumerate(whiles)
+        if ALL or (number + exception) % len(whiles) == place
     ]
 
 

@@ -2,6 +2,7 @@
 
 In virtual time, and as in `test_hal_loop` only HAL is not there. The exceptions are those of the Modbus specification
 (V1.1b3, section 7), of which some say that they pass and others that they do not: a motor is told to stop all the same.
+`make test` has every end with every exception and with each time, `DRIVEBUS_MATRIX=all` all of them together.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import pytest
 from drivebus import Drive, Simulator
 from drivebus.hal import HalGone
 
-from .matrix import ALL
+from .matrix import ALL, refusals
 from .test_hal_loop import COAST, COMMAND, STOP, Cell
 
 
@@ -77,9 +78,7 @@ def refused(cell: Cell, since: float) -> set[int]:
 
 
 @pytest.mark.parametrize("asked", ["writes", "anything"] if ALL else ["writes"])
-@pytest.mark.parametrize("seconds", [0.02, 0.5, 2.0, 5.0])
-@pytest.mark.parametrize("exception", range(0x01, 0x0C))
-@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize(("end", "exception", "seconds"), refusals([*ENDS]))
 def test_no_end_leaves_the_spindle_running(turning: Cell, end: str, exception: int, seconds: float, asked: str) -> None:
     cell = turning
     with suppress(SystemExit, HalGone, Mistake), cell.motor:

@@ -1,6 +1,7 @@
 """A halt of a unit that refuses it for a while, is busy, loses requests or says nothing: told until it is taken.
 
-In virtual time, against a GD350 that a program runs. The judge is the simulated drive.
+In virtual time, against a GD350 that a program runs. The judge is the simulated drive. `make test` has every end with
+every exception and with each time for which it comes, `DRIVEBUS_MATRIX=all` all of them together.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import drivebus
 import drivebus.aio
 from drivebus import Bus, Drive, DrivebusError, Simulator
 
-from .matrix import ALL
+from .matrix import ALL, refusals
 
 
 @pytest.fixture
@@ -34,13 +35,12 @@ def test_one_that_is_identified_is_told_at_once(line: tuple[Simulator, Bus]) -> 
     assert first == drivebus.rtu.encode_write(1, 0x2000, 5)
 
 
-@pytest.mark.parametrize("exception", [*range(0x01, 0x09), 0x09, 0x0A, 0x0B])
-@pytest.mark.parametrize("seconds", [0.02, 0.5, 2.0, 5.0])
-@pytest.mark.parametrize(
-    "end", ["stop", "coast", "stop_all", "block", "exception", "jog", "jog block", "trial", "await"]
-)
+ENDS = ["stop", "coast", "stop_all", "block", "exception", "jog", "jog block", "trial", "await"]
+
+
+@pytest.mark.parametrize(("end", "exception", "seconds"), refusals(ENDS))
 def test_a_refusal_that_ends_leaves_no_motor_running(
-    line: tuple[Simulator, Bus], exception: int, seconds: float, end: str
+    line: tuple[Simulator, Bus], end: str, exception: int, seconds: float
 ) -> None:
     simulator, bus = line
     drive = bus.drive(1, "gd350")
