@@ -177,6 +177,9 @@ fn files_that_cannot_be_read_are_named() {
 }
 
 proptest! {
+    // Each loads all files of a profile.
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
     /// Whatever is cut out of a file and put in its place: a profile or an error, never a panic.
     #[test]
     fn no_damage_panics(file in 0_usize..4, at in 0.0..1.0, cut in 0_usize..40, put in "[a-z0-9,=\"\\n\\[\\].-]{0,8}") {
