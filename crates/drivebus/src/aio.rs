@@ -18,9 +18,13 @@
 
 mod asked;
 mod bus;
+mod drive;
 mod poll;
+mod running;
 mod slot;
 
 pub use asked::Asked;
 pub use bus::Bus;
+pub use drive::Drive;
 pub use poll::Poll;
+pub use running::Running;

@@ -1,14 +1,18 @@
 //! The bus as a program uses it: plain numbers in, words out, one thread that waits.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use drivebus_drives::Place;
+use drivebus_drive::Record;
+use drivebus_drives::{Place, Profile};
 use drivebus_line::{Bus as Core, CallOptions as LineOptions, Done, Link, Stats, UnitOptions, Watch};
-use drivebus_rtu::{Answer, Destination, Instant, Request};
+use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::checks;
+use crate::driving::Drive;
 use crate::error::Error;
+use crate::named::Named;
 use crate::options::CallOptions;
 use crate::payload::Payload;
 use crate::poll::{Poll, Target};
@@ -22,6 +26,8 @@ use crate::replies;
 #[derive(Debug, Clone)]
 pub struct Bus {
     pub(crate) core: Arc<Core>,
+    /// What was sent to each unit that was named here, and what it said of itself.
+    records: Arc<Mutex<BTreeMap<UnitAddress, Record>>>,
     #[cfg(feature = "sim")]
     simulator: Option<drivebus_sim::Simulator>,
 }
@@ -30,6 +36,7 @@ impl Bus {
     pub(crate) fn around(core: Core) -> Self {
         Self {
             core: Arc::new(core),
+            records: Arc::default(),
             #[cfg(feature = "sim")]
             simulator: None,
         }
@@ -37,13 +44,37 @@ impl Bus {
 
     #[cfg(feature = "sim")]
     pub(crate) fn simulated(core: Core, simulator: drivebus_sim::Simulator) -> Self {
-        Self { core: Arc::new(core), simulator: Some(simulator) }
+        Self { simulator: Some(simulator), ..Self::around(core) }
     }
 
     /// The simulator behind a `sim://` port: its wire and its drives, seen from the shaft.
     #[cfg(feature = "sim")]
     pub fn simulator(&self) -> Option<&drivebus_sim::Simulator> {
         self.simulator.as_ref()
+    }
+
+    /// The drive at `unit` (1..=247), which is one of the family of `profile`. Nothing is sent.
+    ///
+    /// All handles of a unit on one line, clones of the bus included, share what was sent to it and what it said of itself.
+    ///
+    /// ```
+    /// use drivebus::{Bus, Profile};
+    ///
+    /// # #[cfg(feature = "sim")] {
+    /// let bus = Bus::open("sim://gd350?clock=virtual")?;
+    /// let drive = bus.drive(1, &Profile::builtin("gd350")?)?;
+    /// assert_eq!(drive.status()?.to_string(), "stopped, 0.00 of 0.00 Hz");
+    /// # }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`NotAllowed`](crate::ErrorKind::NotAllowed): no such unit.
+    pub fn drive(&self, unit: u8, profile: &Arc<Profile>) -> Result<Drive, Error> {
+        let unit = checks::unit(unit)?;
+        let record = self.records.lock().unwrap_or_else(PoisonError::into_inner).entry(unit).or_default().clone();
+        Ok(Drive::new(self, Named::new(unit, profile, record)))
     }
 
     /// The name of the port, for messages.

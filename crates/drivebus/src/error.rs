@@ -27,8 +27,8 @@ pub struct Error {
     message: String,
     /// What is known of the call where there was one.
     call: Option<Box<CallError>>,
-    /// Whether the unit may have done what was asked by several calls.
-    has_acted: bool,
+    /// Whether the unit may have done what was asked, where more is known of that than the call tells.
+    has_acted: Option<bool>,
 }
 
 impl Error {
@@ -39,12 +39,27 @@ impl Error {
 
     /// An error of this kind, of no one call.
     pub(crate) fn of(kind: ErrorKind, why: impl fmt::Display) -> Self {
-        Self { kind, message: why.to_string(), call: None, has_acted: false }
+        Self { kind, message: why.to_string(), call: None, has_acted: None }
     }
 
-    /// The same, of several calls by which the unit may have done what was asked, where that is so.
+    /// The same, of what was asked by several calls: whether the unit may have done it.
     pub(crate) fn having_acted(self, has_acted: bool) -> Self {
-        Self { has_acted, ..self }
+        Self { has_acted: Some(has_acted), ..self }
+    }
+
+    /// What it was the cause of, in the words of that.
+    pub(crate) fn retold(self, kind: ErrorKind, message: String) -> Self {
+        Self { kind, message, ..self }
+    }
+
+    /// The same, which says first what was asked, where no call says that.
+    pub(crate) fn saying_first(self, what: impl fmt::Display) -> Self {
+        if self.call.is_some() { self } else { Self { message: format!("{what}: {}", self.message), ..self } }
+    }
+
+    /// The same, which says last what came next.
+    pub(crate) fn saying_last(self, what: impl fmt::Display) -> Self {
+        Self { message: format!("{}. {what}", self.message), ..self }
     }
 
     /// What kind of failure it is, and so by whose fault.
@@ -54,7 +69,7 @@ impl Error {
 
     /// Whether the unit may have done what was asked: the request went out, and the unit did not refuse it.
     pub fn may_have_acted(&self) -> bool {
-        self.has_acted || self.call.as_ref().is_some_and(|call| call.may_have_acted())
+        self.has_acted.unwrap_or_else(|| self.call.as_ref().is_some_and(|call| call.may_have_acted()))
     }
 
     /// The unit's exception code, where it refused. What it means in this family, [`Profile::exception`] knows.
@@ -101,7 +116,7 @@ impl From<Box<CallError>> for Error {
             Failure::Refused { code, .. } => format!("{call} ({} by the specification)", code.standard_name()),
             _ => call.to_string(),
         };
-        Self { kind: call.kind(), message, call: Some(call), has_acted: false }
+        Self { kind: call.kind(), message, call: Some(call), has_acted: None }
     }
 }
 

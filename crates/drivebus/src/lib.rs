@@ -63,25 +63,33 @@ pub mod aio;
 mod builder;
 mod bus;
 mod checks;
+mod driving;
 mod error;
 mod halting;
+mod named;
+mod not_done;
 mod operations;
 mod options;
 mod payload;
 mod poll;
 mod reading;
 mod replies;
+mod running;
 #[cfg(feature = "sim")]
 mod simulated;
+mod status;
 
 pub use builder::Builder;
 pub use bus::Bus;
+pub use driving::Drive;
 pub use error::Error;
 pub use halting::Halting;
 pub use options::CallOptions;
 pub use payload::Payload;
 pub use poll::{Poll, Sample, Target};
 pub use reading::{Reading, Values};
+pub use running::Running;
+pub use status::Status;
 
 pub use drivebus_drive as drive;
 pub use drivebus_drives as drives;
@@ -90,7 +98,8 @@ pub use drivebus_rtu as rtu;
 #[cfg(feature = "sim")]
 pub use drivebus_sim as sim;
 
-pub use drives::{Profile, Value};
+pub use drive::{Frequencies, Look, Setting, Start};
+pub use drives::{Fault, Profile, State, Value};
 #[cfg(feature = "serial")]
 pub use line::rs485::Rs485;
 pub use line::{AdapterEcho, ErrorKind, Link, Opener, Share, Stats, UnitOptions};

@@ -15,7 +15,6 @@ use drivebus_rtu::{Answer, ExceptionCode, Instant, UnitAddress};
 use crate::bus::Bus;
 use crate::checks;
 use crate::error::Error;
-use crate::halting::Halting;
 use crate::options::CallOptions;
 use crate::payload::Payload;
 use crate::replies;
@@ -149,40 +148,6 @@ impl Bus {
     /// [`Error`]: a look changes nothing in a drive, whatever became of it.
     pub fn look(&self, unit: u8, looks: &Arc<Looks>) -> Result<Look, Error> {
         self.carry_out(look(unit, looks)?)
-    }
-
-    /// Halts a unit, and proves it: it is told until it takes that, and then looked at until its own state shows it.
-    ///
-    /// A halt goes before all who wait for the line, as do the looks that prove it. It returns when the unit stands; or, of a
-    /// stop, after half a second and a hertz along the ramp that is set in the drive, where only the bus commands it. Where
-    /// the family has no state that may be used, the unit's confirmation is all there is. Each halt is an absolute word, so
-    /// one that is lost, or refused, is sent again.
-    ///
-    /// A unit that has not said yet what it is is asked before, where the word may start a drive of another family: one that
-    /// shows another shipped family is halted as that.
-    ///
-    /// ```
-    /// use drivebus::{Bus, Halting, Profile};
-    ///
-    /// # #[cfg(feature = "sim")] {
-    /// let bus = Bus::open("sim://gd350?clock=virtual")?;
-    /// bus.halt(&Halting::coast(1, &Profile::builtin("gd350")?)?)?;
-    /// # }
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    ///
-    /// The motor may still turn. Whether the drive may have taken a halt, [`may_have_acted`](Error::may_have_acted) says.
-    ///
-    /// | kind | |
-    /// | --- | --- |
-    /// | [`NotAllowed`](ErrorKind::NotAllowed) | nothing was sent: a time is out of range, the command is not printed for the family, or the unit may be one of several families that want other words |
-    /// | [`Refused`](ErrorKind::Refused) | the drive did not take it, in all that time: what it was doing before, it still does |
-    /// | [`Port`](ErrorKind::Port), [`NoAnswer`](ErrorKind::NoAnswer), [`BadAnswer`](ErrorKind::BadAnswer) | it could not be sent |
-    /// | [`Unconfirmed`](ErrorKind::Unconfirmed) | it went out, and is not proved; or the unit never said what it is, and nothing was sent |
-    pub fn halt(&self, halting: &Halting) -> Result<(), Error> {
-        self.carry_out(halting.task(self)?)
     }
 
     /// Carries an operation out: does what the `task` wishes for, one thing after another, until it is done.

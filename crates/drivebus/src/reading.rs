@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use drivebus_drives::{Evidence, Place, Profile, ReadPlan, Value};
+use drivebus_line::ErrorKind;
 
 use crate::error::Error;
 
@@ -32,7 +33,7 @@ impl Reading {
     ///
     /// # Errors
     ///
-    /// [`NotAllowed`](crate::ErrorKind::NotAllowed): a name is unknown (the closest is named), cannot be read, or no
+    /// [`NotAllowed`](ErrorKind::NotAllowed): a name is unknown (the closest is named), cannot be read, or no
     /// document of the family proves it: then [`unverified`](Self::unverified) reads it all the same.
     pub fn new<'a>(profile: &Profile, names: impl IntoIterator<Item = &'a str>) -> Result<Self, Error> {
         Self::plan(profile, names, false)
@@ -108,6 +109,12 @@ impl Values {
         let called = |names: &Names| names.name == name || names.asked == name;
         let place = self.planned.names.iter().position(called)?;
         self.values.get(place).copied().flatten()
+    }
+
+    /// The only one.
+    pub(crate) fn only(&self) -> Result<Value, Error> {
+        let missing = || Error::of(ErrorKind::BadAnswer, "its words have not come");
+        self.values.first().copied().flatten().ok_or_else(missing)
     }
 
     /// Each value with its name in the profile and its unit (empty for plain numbers), in the order that was asked for.

@@ -6,17 +6,17 @@ use std::time::Duration;
 
 use drivebus_drive::task::{Outcome, Read, Step, Task, Wish};
 use drivebus_drive::{Identification, Look, Looks};
-use drivebus_drives::Place;
+use drivebus_drives::{Place, Profile};
 use drivebus_line::{CallOptions as LineOptions, Reply, Stats};
 use drivebus_rtu::{Destination, Instant, Request, UnitAddress};
 
 use super::asked::Asked;
+use super::drive::Drive;
 use super::poll::Poll;
 use crate::builder::Builder;
 use crate::bus::once;
 use crate::checks;
 use crate::error::Error;
-use crate::halting::Halting;
 use crate::operations;
 use crate::options::CallOptions;
 use crate::payload::Payload;
@@ -45,6 +45,15 @@ impl Bus {
     pub fn open_as(builder: Builder, port: &str) -> Asked<Self> {
         let port = port.to_owned();
         Asked::apart(move |wanted| builder.open_while(&port, &mut || wanted.load(Ordering::Acquire)).map(Self))
+    }
+
+    /// The drive at `unit`: as [`Bus::drive`](crate::Bus::drive).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Bus::drive`](crate::Bus::drive).
+    pub fn drive(&self, unit: u8, profile: &Arc<Profile>) -> Result<Drive, Error> {
+        self.0.drive(unit, profile).map(Drive::from)
     }
 
     /// The same bus for who waits in a thread: what it tells at once is asked there.
@@ -141,16 +150,6 @@ impl Bus {
     /// Those of [`Bus::look`](crate::Bus::look).
     pub async fn look(&self, unit: u8, looks: &Arc<Looks>) -> Result<Look, Error> {
         self.carry_out(operations::look(unit, looks)?).await
-    }
-
-    /// Halts a unit, and proves it: as [`Bus::halt`](crate::Bus::halt). Where this future is dropped, a halt that was not
-    /// sent yet is not sent, and one that was is not proved.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Bus::halt`](crate::Bus::halt).
-    pub async fn halt(&self, halting: &Halting) -> Result<(), Error> {
-        self.carry_out(halting.task(&self.0)?).await
     }
 
     /// Carries an operation out: as [`Bus::carry_out`](crate::Bus::carry_out). Where this future is dropped, it ends where it

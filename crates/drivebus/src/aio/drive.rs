@@ -1,0 +1,259 @@
+//! The drive whose calls are futures.
+
+use std::sync::Arc;
+
+use drivebus_drive::{Contradiction, Frequencies, Identification, Look, Setting, Start};
+use drivebus_drives::{Fault, Profile, Value};
+
+use super::bus::Bus;
+use super::running::Running;
+use crate::error::Error;
+use crate::halting::Halting;
+use crate::named::Work;
+use crate::reading::Values;
+use crate::status::Status;
+
+/// One drive on a line, whose calls are futures. The calls are those of [`drivebus::Drive`](crate::Drive), and so is what
+/// they say of errors.
+///
+/// Who drops a future of a start before it was sent has taken it back; what was sent goes on, and nobody looks at it any
+/// more. [`running`](Self::running) stops what it started also then.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    bus: Bus,
+    drive: crate::Drive,
+}
+
+impl From<crate::Drive> for Drive {
+    fn from(drive: crate::Drive) -> Self {
+        Self { bus: drive.bus().aio(), drive }
+    }
+}
+
+impl Drive {
+    /// As [`Drive::unverified`](crate::Drive::unverified).
+    #[must_use]
+    pub fn unverified(self) -> Self {
+        Self { drive: self.drive.unverified(), ..self }
+    }
+
+    /// As [`Drive::trust_profile`](crate::Drive::trust_profile).
+    #[must_use]
+    pub fn trust_profile(self) -> Self {
+        Self { drive: self.drive.trust_profile(), ..self }
+    }
+
+    /// The same drive for who waits in a thread.
+    pub fn blocking(&self) -> &crate::Drive {
+        &self.drive
+    }
+
+    /// The line that it is on.
+    pub fn bus(&self) -> &Bus {
+        &self.bus
+    }
+
+    /// Its address, 1..=247.
+    pub fn unit(&self) -> u8 {
+        self.drive.unit()
+    }
+
+    /// What its family means by its registers.
+    pub fn profile(&self) -> &Arc<Profile> {
+        self.drive.profile()
+    }
+
+    /// As [`Drive::run`](crate::Drive::run).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::run`](crate::Drive::run).
+    pub async fn run(&self, hz: impl Into<Option<f64>>) -> Result<(), Error> {
+        self.run_with(&Start::run(false, hz.into())).await
+    }
+
+    /// As [`Drive::run_reverse`](crate::Drive::run_reverse).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::run`](crate::Drive::run).
+    pub async fn run_reverse(&self, hz: impl Into<Option<f64>>) -> Result<(), Error> {
+        self.run_with(&Start::run(true, hz.into())).await
+    }
+
+    /// As [`Drive::jog`](crate::Drive::jog).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::run`](crate::Drive::run).
+    pub async fn jog(&self) -> Result<(), Error> {
+        self.run_with(&Start::jog(false)).await
+    }
+
+    /// As [`Drive::run_with`](crate::Drive::run_with).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::run_with`](crate::Drive::run_with).
+    pub async fn run_with(&self, start: &Start) -> Result<(), Error> {
+        self.bus.carry_out(self.drive.named().start(start)?).await
+    }
+
+    /// As [`Drive::running`](crate::Drive::running). Where this future is dropped while it starts the motor, the motor is
+    /// stopped as by the guard.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::running`](crate::Drive::running).
+    pub async fn running(&self, hz: impl Into<Option<f64>>) -> Result<Running, Error> {
+        self.running_with(&Start::run(false, hz.into())).await
+    }
+
+    /// As [`Drive::running_with`](crate::Drive::running_with).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::running`](crate::Drive::running).
+    pub async fn running_with(&self, start: &Start) -> Result<Running, Error> {
+        let running = Running::before(self, start);
+        match self.run_with(start).await {
+            Ok(()) => Ok(running),
+            Err(error) if error.may_have_acted() => Err(crate::Running::after(error, running.stop().await)),
+            Err(error) => {
+                running.leave();
+                Err(error)
+            }
+        }
+    }
+
+    /// As [`Drive::stop`](crate::Drive::stop).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::halt`](crate::Drive::halt).
+    pub async fn stop(&self) -> Result<(), Error> {
+        self.halt(&Halting::stop()).await
+    }
+
+    /// As [`Drive::coast`](crate::Drive::coast).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::halt`](crate::Drive::halt).
+    pub async fn coast(&self) -> Result<(), Error> {
+        self.halt(&Halting::coast()).await
+    }
+
+    /// As [`Drive::halt`](crate::Drive::halt). Where this future is dropped, a halt that was not sent yet is not sent, and one
+    /// that was is not proved.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::halt`](crate::Drive::halt).
+    pub async fn halt(&self, halting: &Halting) -> Result<(), Error> {
+        self.bus.carry_out(self.drive.named().halt(halting)?).await
+    }
+
+    /// As [`Drive::reset_fault`](crate::Drive::reset_fault).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::reset_fault`](crate::Drive::reset_fault).
+    pub async fn reset_fault(&self) -> Result<(), Error> {
+        self.bus.carry_out(self.drive.named().reset_fault()).await
+    }
+
+    /// As [`Drive::set_frequency`](crate::Drive::set_frequency).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::set_frequency`](crate::Drive::set_frequency).
+    pub async fn set_frequency(&self, hz: f64) -> Result<(), Error> {
+        self.bus.carry_out(self.drive.named().set_frequency(hz)).await
+    }
+
+    /// As [`Drive::frequencies`](crate::Drive::frequencies).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::frequencies`](crate::Drive::frequencies).
+    pub async fn frequencies(&self) -> Result<Option<Frequencies>, Error> {
+        self.bus.carry_out(self.drive.named().frequencies()).await
+    }
+
+    /// As [`Drive::look`](crate::Drive::look).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::frequencies`](crate::Drive::frequencies).
+    pub async fn look(&self) -> Result<Look, Error> {
+        self.bus.carry_out(self.drive.named().look()).await
+    }
+
+    /// As [`Drive::status`](crate::Drive::status).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::frequencies`](crate::Drive::frequencies).
+    pub async fn status(&self) -> Result<Status, Error> {
+        self.bus.carry_out(self.drive.named().status()).await
+    }
+
+    /// As [`Drive::fault`](crate::Drive::fault).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::fault`](crate::Drive::fault).
+    pub async fn fault(&self) -> Result<Option<Fault>, Error> {
+        self.bus.carry_out(self.drive.named().fault()?).await
+    }
+
+    /// As [`Drive::control`](crate::Drive::control).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::frequencies`](crate::Drive::frequencies).
+    pub async fn control(&self) -> Result<Vec<Setting>, Error> {
+        self.bus.carry_out(self.drive.named().control()).await
+    }
+
+    /// As [`Drive::identify`](crate::Drive::identify).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Bus::identify`](crate::Bus::identify).
+    pub async fn identify(&self) -> Result<Identification, Error> {
+        self.bus.carry_out(self.drive.named().identify()).await
+    }
+
+    /// As [`Drive::contradiction`](crate::Drive::contradiction).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::frequencies`](crate::Drive::frequencies).
+    pub async fn contradiction(&self) -> Result<Option<Contradiction>, Error> {
+        self.bus.carry_out(self.drive.named().contradiction()).await
+    }
+
+    /// As [`Drive::read`](crate::Drive::read).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::read`](crate::Drive::read).
+    pub async fn read(&self, name: &str) -> Result<Value, Error> {
+        self.carry_out_values(self.drive.named().values([name])).await?.only()
+    }
+
+    /// As [`Drive::values`](crate::Drive::values).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::read`](crate::Drive::read).
+    pub async fn values<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Values, Error> {
+        self.carry_out_values(self.drive.named().values(names)).await
+    }
+
+    async fn carry_out_values(&self, work: Result<Work<Values>, Error>) -> Result<Values, Error> {
+        self.bus.carry_out(work?).await
+    }
+}
