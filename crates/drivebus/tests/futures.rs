@@ -3,71 +3,36 @@
 #![cfg(feature = "sim")]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+#[path = "shared/tapped.rs"]
+mod tapped;
+
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::channel;
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
 use drivebus::drive::Looks;
 use drivebus::drive::task::{Mailbox, Task};
 use drivebus::drives::State;
-use drivebus::line::{Line, LineClock, PortError};
-use drivebus::sim::{Options, SimLine, Simulator};
-use drivebus::{AdapterEcho, Bus, Error, ErrorKind, Instant, Profile, Reading, Target, aio};
+use drivebus::sim::{Options, Simulator};
+use drivebus::{Bus, Error, ErrorKind, Profile, Reading, Target, aio};
 
 const ACCELERATION: u16 = 0x800B; // P00.11 in RAM
-
-/// A line whose first transmission waits until it is let go: whoever asks meanwhile stands in the queue.
-#[derive(Debug)]
-struct Gate {
-    line: SimLine,
-    first: Option<(Sender<()>, Receiver<()>)>,
-}
-
-impl Line for Gate {
-    fn now(&self) -> Instant {
-        self.line.now()
-    }
-
-    fn send(&mut self, bytes: &[u8]) -> Result<Instant, PortError> {
-        if let Some((has_begun, let_go)) = self.first.take() {
-            has_begun.send(()).unwrap();
-            let_go.recv().unwrap();
-        }
-        self.line.send(bytes)
-    }
-
-    fn receive(&mut self, buffer: &mut [u8], until: Instant) -> Result<usize, PortError> {
-        self.line.receive(buffer, until)
-    }
-
-    fn sleep(&mut self, until: Instant) {
-        self.line.sleep(until);
-    }
-
-    fn name(&self) -> String {
-        self.line.name()
-    }
-
-    fn is_virtual(&self) -> bool {
-        true
-    }
-
-    fn clock(&self) -> Option<LineClock> {
-        self.line.clock()
-    }
-}
 
 /// Runs `test` while somebody else has the line; what it returns is seen when the line is free again.
 fn while_taken<T>(test: impl FnOnce(&aio::Bus) -> T) -> (T, aio::Bus, Simulator) {
     let simulator = Simulator::new([(1, "gd350")], Options::default()).unwrap();
     let (has_begun, begun) = channel();
     let (let_go, told) = channel();
-    let mut gate = Some(Gate { line: simulator.line(), first: Some((has_begun, told)) });
-    let opener = move || Ok(Box::new(gate.take().unwrap()) as Box<dyn Line>);
-    let bus = Bus::builder().echo(AdapterEcho::Absent).open_with(Box::new(opener)).unwrap();
+    let mut first = Some((has_begun, told));
+    let bus = tapped::open(&simulator, move |_| {
+        if let Some((has_begun, let_go)) = first.take() {
+            has_begun.send(()).unwrap();
+            let_go.recv().unwrap();
+        }
+    });
     let other = bus.clone();
     let taken = std::thread::spawn(move || other.read(1, 0x2103, 1).unwrap());
     begun.recv().unwrap();

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use drivebus::drives::{Command, Entry, Place, Setpoint};
 use drivebus::sim::{Asked, Refusals, SimulatedDrive};
-use drivebus::{Bus, CallOptions, Error, ErrorKind, Halting, Profile, aio};
+use drivebus::{Bus, CallOptions, Drive, Error, ErrorKind, Halting, Profile};
 
 /// Families of four makers.
 const FAMILIES: [&str; 5] = ["gd350", "vfd500", "ms300", "a1000", "wj200"];
@@ -34,7 +34,7 @@ impl Plant {
         let needs = &profile.setpoints()[&Setpoint::Frequency].needs;
         for setting in profile.control().iter().chain(needs) {
             let place = place(profile.find(&setting.code).unwrap());
-            let _absent = self.drive().set_parameter(place.address, setting.raw);
+            let _absent = self.simulated().set_parameter(place.address, setting.raw);
         }
         for _ in 0..3 {
             // Some want to be made ready before, by the words that come before a run.
@@ -47,9 +47,9 @@ impl Plant {
             }
         }
         bus.sleep(Duration::from_secs(30));
-        assert_eq!(self.drive().state(), "forward", "{}", profile.name());
-        assert!(self.drive().frequency() > 0.5, "{}", profile.name());
-        self.drive().take_writes();
+        assert_eq!(self.simulated().state(), "forward", "{}", profile.name());
+        assert!(self.simulated().frequency() > 0.5, "{}", profile.name());
+        self.simulated().take_writes();
     }
 
     /// Some families know no 06H.
@@ -58,21 +58,17 @@ impl Plant {
         if knows_one { self.bus.write(1, place, word) } else { self.bus.write(1, place, [word]) }
     }
 
-    fn drive(&self) -> SimulatedDrive {
+    fn simulated(&self) -> SimulatedDrive {
         self.bus.simulator().unwrap().drive(1).unwrap()
     }
 
-    fn stop(&self) -> Halting {
-        Halting::stop(1, &self.profile).unwrap().unverified()
-    }
-
-    fn coast(&self) -> Halting {
-        Halting::coast(1, &self.profile).unwrap().unverified()
+    fn drive(&self) -> Drive {
+        self.bus.drive(1, &self.profile).unwrap().unverified()
     }
 
     fn is_at_rest(&self) -> bool {
         self.bus.sleep(Duration::from_secs(60));
-        self.drive().frequency().abs() < 0.01 && self.drive().state() != "forward"
+        self.simulated().frequency().abs() < 0.01 && self.simulated().state() != "forward"
     }
 }
 
@@ -80,13 +76,13 @@ impl Plant {
 fn a_motor_that_runs_is_halted_in_the_words_of_its_family() {
     for family in FAMILIES {
         let plant = Plant::of(family);
-        plant.bus.halt(&plant.stop()).unwrap();
-        let written = plant.drive().take_writes();
+        plant.drive().stop().unwrap();
+        let written = plant.simulated().take_writes();
         assert_eq!(written.len(), 1, "{family}: {written:?}");
         assert!(plant.is_at_rest(), "{family}");
 
         let plant = Plant::of(family);
-        match plant.bus.halt(&plant.coast()) {
+        match plant.drive().coast() {
             Ok(()) => assert!(plant.is_at_rest(), "{family}"),
             // A family may have no such command.
             Err(error) => {
@@ -101,13 +97,13 @@ fn a_motor_that_runs_is_halted_in_the_words_of_its_family() {
 fn what_the_drive_refuses_all_the_time_it_has_not_taken() {
     for family in FAMILIES {
         let plant = Plant::of(family);
-        plant.drive().refuse(Refusals::new(0x04).of(Asked::Writes)).unwrap();
-        let halting = plant.stop().trust_profile().within(Duration::from_secs(1));
-        let error = plant.bus.halt(&halting).unwrap_err();
+        plant.simulated().refuse(Refusals::new(0x04).of(Asked::Writes)).unwrap();
+        let (drive, halting) = (plant.drive().trust_profile(), Halting::stop().within(Duration::from_secs(1)));
+        let error = drive.halt(&halting).unwrap_err();
         assert_eq!((error.kind(), error.may_have_acted()), (ErrorKind::Refused, false), "{family}: {error}");
-        assert_eq!(plant.drive().state(), "forward", "{family}");
-        plant.drive().refuse_no_more();
-        plant.bus.halt(&halting).unwrap();
+        assert_eq!(plant.simulated().state(), "forward", "{family}");
+        plant.simulated().refuse_no_more();
+        drive.halt(&halting).unwrap();
         assert!(plant.is_at_rest(), "{family}");
     }
 }
@@ -116,12 +112,13 @@ fn what_the_drive_refuses_all_the_time_it_has_not_taken() {
 #[test]
 fn a_silent_unit_may_have_taken_it() {
     let plant = Plant::of("gd350");
-    let halting = Halting::stop(9, &plant.profile).unwrap().within(Duration::from_secs(1));
-    let error = plant.bus.halt(&halting).unwrap_err();
+    let (drive, halting) =
+        (plant.bus.drive(9, &plant.profile).unwrap(), Halting::stop().within(Duration::from_secs(1)));
+    let error = drive.halt(&halting).unwrap_err();
     assert_eq!((error.kind(), error.may_have_acted()), (ErrorKind::Unconfirmed, true), "{error}");
     assert!(error.to_string().starts_with("stop of unit 9 as INVT Goodrive350: it was sent "), "{error}");
     plant.bus.close();
-    let error = plant.bus.halt(&halting).unwrap_err();
+    let error = drive.halt(&halting).unwrap_err();
     assert_eq!((error.kind(), error.may_have_acted()), (ErrorKind::Port, false), "{error}");
 }
 
@@ -130,31 +127,32 @@ fn a_silent_unit_may_have_taken_it() {
 fn a_unit_of_another_family_is_halted_as_what_it_is() {
     let plant = Plant::of("eds300");
     let gd350 = Profile::builtin("gd350").unwrap();
-    plant.bus.halt(&Halting::stop(1, &gd350).unwrap()).unwrap();
+    plant.bus.drive(1, &gd350).unwrap().stop().unwrap();
     assert!(plant.is_at_rest());
     let (_, runs) = plant.profile.command(Command::RunForward).unwrap();
-    assert!(plant.drive().take_writes().iter().all(|write| write.value != runs));
+    assert!(plant.simulated().take_writes().iter().all(|write| write.value != runs));
 }
 
 #[test]
 fn what_cannot_be_is_not_sent() {
     let plant = Plant::of("gd350");
-    assert_eq!(Halting::stop(0, &plant.profile).unwrap_err().kind(), ErrorKind::NotAllowed);
-    let long = plant.stop().within(Duration::from_secs(3601));
-    assert_eq!(plant.bus.halt(&long).unwrap_err().kind(), ErrorKind::NotAllowed);
+    assert_eq!(plant.bus.drive(0, &plant.profile).unwrap_err().kind(), ErrorKind::NotAllowed);
+    let long = Halting::stop().within(Duration::from_secs(3601));
+    assert_eq!(plant.drive().halt(&long).unwrap_err().kind(), ErrorKind::NotAllowed);
     // Of the commands of a GD3000 only the one that runs it is printed.
     let gd3000 = Profile::builtin("gd3000").unwrap();
-    let error = plant.bus.halt(&Halting::stop(1, &gd3000).unwrap()).unwrap_err();
+    let error = plant.bus.drive(1, &gd3000).unwrap().stop().unwrap_err();
     assert_eq!((error.kind(), error.may_have_acted()), (ErrorKind::NotAllowed, false), "{error}");
-    assert!(plant.drive().take_writes().is_empty());
+    assert!(plant.simulated().take_writes().is_empty());
 }
 
 #[tokio::test]
 async fn a_halt_is_a_future_too() {
     let plant = Plant::of("gd350");
-    let bus = aio::Bus::from(plant.bus.clone());
-    bus.halt(&plant.stop()).await.unwrap();
+    let drive = plant.drive().aio();
+    drive.stop().await.unwrap();
     assert!(plant.is_at_rest());
+    let bus = drive.bus();
     let unheard = bus.write_with(1, 0x2000, 1, CallOptions::new().halts(0)).await;
     assert!(unheard.is_err(), "a start that was decided on before it came");
 }
