@@ -6,13 +6,10 @@
 //! ```
 #![allow(clippy::print_stdout, reason = "an example shows what it does")]
 
+use std::sync::Arc;
 use std::thread;
 
-use drivebus::drives::{Command, State};
-use drivebus::{Bus, CallOptions, Error, Profile};
-
-/// Where a Goodrive350 says what its motor does.
-const STATE_WORD: u16 = 0x2100;
+use drivebus::{Bus, Error, Profile, State};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut ports: Vec<String> = std::env::args().skip(1).collect();
@@ -42,14 +39,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Stops the motor of `unit` if it runs, before anything else that waits for the line, and tells its state.
-fn settle(bus: &Bus, unit: u8, profile: &Profile) -> Result<State, Error> {
-    let sure = CallOptions::new().urgent().verify();
-    let words = bus.read_with(unit, STATE_WORD, 1, sure)?;
-    let state = words.first().map_or(State::Unknown, |&word| profile.state(word));
-    if matches!(state, State::Forward | State::Reverse)
-        && let Some((address, stop)) = profile.command(Command::Stop)
-    {
-        bus.write_with(unit, address, stop, CallOptions::new().urgent())?;
+fn settle(bus: &Bus, unit: u8, profile: &Arc<Profile>) -> Result<State, Error> {
+    let drive = bus.drive(unit, profile)?;
+    if drive.look()?.state.is_running() {
+        drive.stop()?;
     }
-    Ok(state)
+    Ok(drive.look()?.state)
 }

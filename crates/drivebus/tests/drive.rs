@@ -79,7 +79,7 @@ fn is_not_sent_of_a_jog(plant: &Plant) {
 
 #[test]
 fn a_fault_has_a_name_keeps_the_motor_from_starting_and_is_reset() {
-    for family in ["gd350", "vfd500", "ms300", "saj8000m"] {
+    for family in ["gd350", "vfd500", "ms300", "v20"] {
         let plant = Plant::of(family);
         let drive = &plant.drive;
         assert_eq!(drive.fault().unwrap(), None, "{family}");

@@ -151,6 +151,8 @@ fn a_guard_on_a_closed_bus_says_so_and_does_not_panic() {
 /// whether there were so many frames.
 fn stopped_before(family: &str, nth: usize, given: impl Fn(&Drive) -> Given) -> (Result<(), Error>, bool, Plant) {
     let plant = Plant::of(family);
+    // A unit that has not said what it is is asked for that before its stop.
+    assert!(plant.drive.contradiction().unwrap().is_none());
     let (other, stop) = (plant.bus.drive(1, &plant.profile).unwrap().unverified(), Arc::new(Mutex::new(None)));
     let (given, kept, mut frames) = (given(&other), Arc::clone(&stop), 0);
     let mut given = Some(given);
@@ -194,7 +196,7 @@ fn a_halt_wins_over_a_start_whenever_it_is_given() {
             }
             assert!(plant.stands(), "{family}, before frame {nth}: {started:?}");
         }
-        assert!(taken_back > 2 && stopped > 0, "{family}: {taken_back}, {stopped}");
+        assert!(taken_back > 0 && stopped > 0, "{family}: {taken_back}, {stopped}");
     }
 }
 
