@@ -1,7 +1,8 @@
 """Packages each crate that is published, and uses what was packaged, with the others packaged beside it.
 
-A program of somebody else's, which is the one of the README of `drivebus`, is built with the packages and run. Then the
-tests of each package run. What a package leaves out shows here and not with who takes it. Exit code 1 where one fails.
+A program of somebody else's, which is the one of the README of `drivebus` and runs and stops a motor of each of four
+families, is built with the packages and run: as it comes, and with no feature but the simulator. Then the tests of each
+package run. What a package leaves out shows here and not with who takes it. Exit code 1 where one fails.
 
 usage: check_packages.py [--without-tests]
 """
@@ -55,9 +56,13 @@ def patched(places: dict[str, str]) -> str:
     return "[patch.crates-io]\n" + "".join(f"{name} = {{ path = '{place}' }}\n" for name, place in places.items())
 
 
-def stranger(packages: Path, crates: dict[str, str]) -> Path:
+FEATURES = {"stranger": "", "stranger-sim": ', default-features = false, features = ["sim"]'}
+"""What somebody else takes of `drivebus`, by the name of the project."""
+
+
+def stranger(name: str, packages: Path, crates: dict[str, str]) -> Path:
     """A project outside of the workspace with the program of the README of `drivebus`, for what cargo finds for it."""
-    folder = TARGET / "stranger"
+    folder = TARGET / name
     shutil.rmtree(folder / "src", ignore_errors=True)
     (folder / "src").mkdir(parents=True)
     (folder / "Cargo.lock").unlink(missing_ok=True)
@@ -67,8 +72,8 @@ def stranger(packages: Path, crates: dict[str, str]) -> Path:
         sys.exit("check_packages: the README of the packed drivebus has no program")
     (folder / "src/main.rs").write_text(program[1], encoding="utf-8")
     (folder / "Cargo.toml").write_text(
-        '[package]\nname = "stranger"\nversion = "0.0.0"\nedition = "2024"\n\n[dependencies]\n'
-        f'drivebus = "={crates["drivebus"]}"\n\n{patched(places)}\n[workspace]\n',
+        f'[package]\nname = "{name}"\nversion = "0.0.0"\nedition = "2024"\n\n[dependencies]\n'
+        f'drivebus = {{ version = "={crates["drivebus"]}"{FEATURES[name]} }}\n\n{patched(places)}\n[workspace]\n',
         encoding="utf-8",
     )
     return folder
@@ -82,11 +87,20 @@ def main() -> None:
     crates = published()
     packages = unpacked(crates)
     environment = {**os.environ, "CARGO_TARGET_DIR": str(TARGET / "packages-target")}
-    folder = stranger(packages, crates)
-    shown = subprocess.run(
-        [CARGO, "run", "--quiet"], cwd=folder, env=environment, check=True, stdout=subprocess.PIPE, text=True
-    ).stdout
-    shows = " · ".join(shown.splitlines())
+    shown = {
+        subprocess.run(
+            [CARGO, "run", "--quiet"],
+            cwd=stranger(name, packages, crates),
+            env=environment,
+            check=True,
+            stdout=subprocess.PIPE,
+            text=True,
+        ).stdout
+        for name in FEATURES
+    }
+    if len(shown) > 1:
+        sys.exit(f"check_packages: with other features the same program shows something else: {sorted(shown)}")
+    shows = " · ".join(shown.pop().splitlines())
     print(f"{len(crates)} crates packaged; a stranger's program built with them shows {shows}", flush=True)
     if not asked.without_tests:
         sys.exit(subprocess.run([CARGO, "test", "--quiet", "--workspace"], cwd=packages, env=environment).returncode)

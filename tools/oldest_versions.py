@@ -20,7 +20,7 @@ import tomli
 ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
 CARGO = os.environ.get("CARGO", "cargo")
-EXAMPLE = ROOT / "crates/drivebus/examples/read_by_name.rs"
+EXAMPLE = ROOT / "crates/drivebus/examples/three_families.rs"
 
 
 def table(path: Path) -> dict[str, Any]:

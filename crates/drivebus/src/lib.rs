@@ -1,23 +1,33 @@
 //! Variable-frequency drives over RS-485: one door to the protocol, the bus, the drives' meaning and the simulator.
 //!
-//! A [`Bus`] is one line with its owner. It is safe from any thread, takes no answer for another's, and repeats only what
-//! may be repeated. A [`Profile`] says what a family of drives means by its registers, and a [`Reading`] brings values by
-//! name in the fewest reads. A simulated line answers as a real one does:
+//! A [`Bus`] is one line with its owner, a [`Drive`] one drive on it, and a [`Profile`] what its family means by its
+//! registers. A simulated line answers as a real one does:
 //!
 //! ```
-//! use drivebus::{Bus, Profile, Reading};
+//! use std::time::Duration;
+//!
+//! use drivebus::{Bus, Profile};
 //!
 //! let bus = Bus::open("sim://gd350?clock=virtual")?; // a real line: "/dev/ttyUSB0", "COM3", "socket://host:port"
-//! assert_eq!(bus.read(1, 0x2103, 1)?, [0x01A0]); // what a Goodrive350 says it is
-//!
-//! let gd350 = Profile::builtin("gd350")?;
-//! let values = bus.values(1, &Reading::new(&gd350, ["output_current", "bus_voltage"])?)?;
-//! for (name, value, unit) in values.iter() {
-//!     println!("{name} = {value} {unit}");
-//! }
-//! # assert_eq!(values.get("output_current").unwrap().to_string(), "0.0");
+//! # for (address, word) in [(0x8001, 2), (0x8006, 8)] {
+//! #     bus.write(1, address, word)?; // it obeys the bus, and takes its frequency from there
+//! # }
+//! let drive = bus.drive(1, &Profile::builtin("gd350")?)?;
+//! let running = drive.running(10.0)?; // at 10 Hz; what `running` is dropped by stops the motor: `?`, a panic
+//! bus.sleep(Duration::from_secs(5)); // on the line's clock
+//! assert_eq!(running.status()?.to_string(), "forward, 10.00 of 10.00 Hz");
+//! println!("{} A", running.read("output_current")?);
+//! running.stop()?; // an error: the motor may still turn
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! What is checked before a motor starts: that the drive is what it was named as, obeys the bus, is in no fault, and is
+//! reached so well that its stop would be. [`Drive::run`] has the list, and [`Drive::control`] tells how a drive is set.
+//! A start is sent once. A halt is sent until the drive takes it, before all that wait for the line, and returns when the
+//! drive shows it.
+//!
+//! The bus is safe from any thread, takes no answer for another's, and repeats only what may be repeated. A [`Reading`] brings
+//! values by name in the fewest reads, and [`Bus::poll`] again and again.
 //!
 //! # Ports
 //!
@@ -33,11 +43,12 @@
 //! # After an error: did the drive take it?
 //!
 //! [`Error::may_have_acted`] says whether the request went out and may have been obeyed, and [`Error::kind`] says by whose
-//! fault it failed. Nothing that changes something in a drive is repeated here, but a [halt](Bus::halt).
+//! fault it failed. Nothing that changes something in a drive is repeated here, but a [halt](Drive::halt).
 //!
 //! # Without a thread that waits
 //!
-//! [`aio::Bus`] has the same calls as futures, for any executor. Who drops one before it was sent has taken it back.
+//! [`aio::Bus`] and [`aio::Drive`] have the same calls as futures, for any executor. Who drops one before it was sent has
+//! taken it back.
 //!
 //! # Features
 //!
@@ -53,8 +64,9 @@
 //!
 //! # Limits
 //!
-//! - It finds out what a unit is and what it does, and [halts](Bus::halt) it. What starts a motor is in the Python package: a
-//!   program that moves motors from here writes the words and confirms them itself.
+//! - It sets no drive up: [`Drive::control`] tells what is set otherwise, and who stands beside it sets that. Parameters by
+//!   name, backups, and the drive's own watchdog are in the Python package.
+//! - A process that is killed stops no motor. Whoever needs that sets the drive's own time-out of the bus.
 //! - It is no safety function. An emergency stop is a wire.
 
 #![forbid(unsafe_code)]
