@@ -5,14 +5,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use drivebus_drive::Record;
-use drivebus_drives::{Place, Profile};
+use drivebus_drives::Place;
 use drivebus_line::{Bus as Core, CallOptions as LineOptions, Done, Link, Stats, UnitOptions, Watch};
 use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::checks;
-use crate::driving::Drive;
 use crate::error::Error;
-use crate::named::Named;
 use crate::options::CallOptions;
 use crate::payload::Payload;
 use crate::poll::{Poll, Target};
@@ -51,30 +49,6 @@ impl Bus {
     #[cfg(feature = "sim")]
     pub fn simulator(&self) -> Option<&drivebus_sim::Simulator> {
         self.simulator.as_ref()
-    }
-
-    /// The drive at `unit` (1..=247), which is one of the family of `profile`. Nothing is sent.
-    ///
-    /// All handles of a unit on one line, clones of the bus included, share what was sent to it and what it said of itself.
-    ///
-    /// ```
-    /// use drivebus::{Bus, Profile};
-    ///
-    /// # #[cfg(feature = "sim")] {
-    /// let bus = Bus::open("sim://gd350?clock=virtual")?;
-    /// let drive = bus.drive(1, &Profile::builtin("gd350")?)?;
-    /// assert_eq!(drive.status()?.to_string(), "stopped, 0.00 of 0.00 Hz");
-    /// # }
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    ///
-    /// [`NotAllowed`](crate::ErrorKind::NotAllowed): no such unit.
-    pub fn drive(&self, unit: u8, profile: &Arc<Profile>) -> Result<Drive, Error> {
-        let unit = checks::unit(unit)?;
-        let record = self.records.lock().unwrap_or_else(PoisonError::into_inner).entry(unit).or_default().clone();
-        Ok(Drive::new(self, Named::new(unit, profile, record)))
     }
 
     /// The name of the port, for messages.
@@ -314,6 +288,11 @@ impl Bus {
     /// The same bus, with futures for calls.
     pub fn aio(&self) -> crate::aio::Bus {
         crate::aio::Bus::from(self.clone())
+    }
+
+    /// What was sent to `unit`, and what it said of itself.
+    pub(crate) fn record(&self, unit: UnitAddress) -> Record {
+        self.records.lock().unwrap_or_else(PoisonError::into_inner).entry(unit).or_default().clone()
     }
 
     pub(crate) fn call(

@@ -6,11 +6,11 @@ use drivebus_drive::{Contradiction, Frequencies, Identification, Look, Setting, 
 use drivebus_drives::{Fault, Profile, Value};
 
 use crate::bus::Bus;
+use crate::checks;
 use crate::error::Error;
 use crate::halting::Halting;
 use crate::named::Named;
 use crate::reading::Values;
-use crate::running::Running;
 use crate::status::Status;
 
 /// One drive on a line: started after checks, halted until it takes that, and proved to do it by what it shows itself.
@@ -41,11 +41,32 @@ pub struct Drive {
     named: Named,
 }
 
-impl Drive {
-    pub(crate) fn new(bus: &Bus, named: Named) -> Self {
-        Self { bus: bus.clone(), named }
+impl Bus {
+    /// The drive at `unit` (1..=247), which is one of the family of `profile`. Nothing is sent.
+    ///
+    /// All handles of a unit on one line, clones of the bus included, share what was sent to it and what it said of itself.
+    ///
+    /// ```
+    /// use drivebus::{Bus, Profile};
+    ///
+    /// # #[cfg(feature = "sim")] {
+    /// let bus = Bus::open("sim://gd350?clock=virtual")?;
+    /// let drive = bus.drive(1, &Profile::builtin("gd350")?)?;
+    /// assert_eq!(drive.status()?.to_string(), "stopped, 0.00 of 0.00 Hz");
+    /// # }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`NotAllowed`](crate::ErrorKind::NotAllowed): no such unit.
+    pub fn drive(&self, unit: u8, profile: &Arc<Profile>) -> Result<Drive, Error> {
+        let unit = checks::unit(unit)?;
+        Ok(Drive { bus: self.clone(), named: Named::new(unit, profile, self.record(unit)) })
     }
+}
 
+impl Drive {
     /// The same drive, also by what no document of its family proves: commands, states, registers.
     #[must_use]
     pub fn unverified(self) -> Self {
@@ -154,35 +175,6 @@ impl Drive {
     /// Those of [`run`](Self::run); [`NotAllowed`](crate::ErrorKind::NotAllowed) also where a time is longer than an hour.
     pub fn run_with(&self, start: &Start) -> Result<(), Error> {
         self.bus.carry_out(self.named.start(start)?)
-    }
-
-    /// Starts the motor as [`run`](Self::run) does, for as long as what it returns lives: a motor that is started so is
-    /// stopped whatever happens, also by a `?` and by a panic.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`run`](Self::run). Where the motor may turn, it was stopped before this returns; what came of that, the
-    /// message says last.
-    pub fn running(&self, hz: impl Into<Option<f64>>) -> Result<Running, Error> {
-        self.running_with(&Start::run(false, hz.into()))
-    }
-
-    /// As [`running`](Self::running), in whatever way `start` says. A jog is ended by the jog's own ramp, in a family that has
-    /// a command for that.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`running`](Self::running).
-    pub fn running_with(&self, start: &Start) -> Result<Running, Error> {
-        let running = Running::before(self, start);
-        match self.run_with(start) {
-            Ok(()) => Ok(running),
-            Err(error) if error.may_have_acted() => Err(Running::after(error, running.stop())),
-            Err(error) => {
-                running.leave();
-                Err(error)
-            }
-        }
     }
 
     /// Stops the motor as its drive is set to stop it, usually by its ramp, and proves it.

@@ -5,15 +5,16 @@ use std::time::Duration;
 
 use drivebus_drive::task::{Mailbox, Read, Task};
 use drivebus_drive::{
-    self as drive, Contradiction, Families, Family, Frequencies, Halt, Identification, Look, Looks, NotHalted, Order,
-    Record, Rule, SameUnit, Setting, Speeds, Start, Taken,
+    self as drive, Contradiction, Families, Family, Frequencies, Halt, Identification, Look, Looks, NotHalted,
+    NotSettled, Order, Record, Rule, SameUnit, Setting, Speeds, Start, Taken,
 };
-use drivebus_drives::{Command, Fault, Profile, Setpoint};
+use drivebus_drives::{Command, Entry, Fault, Profile, Setpoint};
 use drivebus_rtu::UnitAddress;
 
 use crate::checks;
 use crate::error::Error;
 use crate::halting::Halting;
+use crate::operations;
 use crate::reading::{Reading, Values};
 use crate::status::Status;
 
@@ -154,8 +155,7 @@ impl Named {
     }
 
     pub(crate) fn identify(&self) -> Work<Identification> {
-        let unit = self.address;
-        Task::new(async move |line| Ok(drive::identify(&line, Families::shipped(), unit).await?))
+        operations::identify(self.address)
     }
 
     pub(crate) fn contradiction(&self) -> Work<Option<Contradiction>> {
@@ -163,16 +163,16 @@ impl Named {
         Task::new(async move |line| named.same(&line).contradiction(&line, Families::shipped(), false).await)
     }
 
-    pub(crate) fn values<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Work<Values>, Error> {
-        let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
-        let (named, planned) = (self.clone(), self.reading(self.profile(), &names)?);
+    pub(crate) fn values<'a>(&self, asked: impl IntoIterator<Item = &'a str>) -> Result<Work<Values>, Error> {
+        let asked: Vec<String> = asked.into_iter().map(str::to_owned).collect();
+        let (named, planned) = (self.clone(), self.reading(self.profile(), &asked)?);
         Ok(Task::new(async move |line| {
             // What the drive is set to may decide what its words mean.
-            let asked: Vec<_> = names.iter().map(String::as_str).collect();
-            let settled = named.call(&line).settled(&line, &asked).await;
+            let all: Vec<_> = asked.iter().map(String::as_str).collect();
+            let settled = named.call(&line).settled(&line, &all).await;
             let settled = settled.map_err(|why| named.tell("values", why.into()))?;
             let is_as_planned = Arc::ptr_eq(settled.profile(), named.profile());
-            let reading = if is_as_planned { planned } else { named.reading(settled.profile(), &names)? };
+            let reading = if is_as_planned { planned } else { named.reading(settled.profile(), &asked)? };
             let line = line.taken_for(&named.family);
             let mut words = Vec::with_capacity(reading.words());
             for (place, count) in reading.spans() {
@@ -182,17 +182,31 @@ impl Named {
         }))
     }
 
-    fn reading(&self, profile: &Profile, names: &[String]) -> Result<Reading, Error> {
-        let names = names.iter().map(String::as_str);
-        if self.is_unverified { Reading::unverified(profile, names) } else { Reading::new(profile, names) }
+    fn reading(&self, profile: &Profile, asked: &[String]) -> Result<Reading, Error> {
+        let asked = asked.iter().map(String::as_str);
+        if self.is_unverified { Reading::unverified(profile, asked) } else { Reading::new(profile, asked) }
     }
 
     async fn looked(&self, line: &Mailbox<Error>) -> Result<Look, Error> {
         self.looks.look(&line.taken_for(&self.family), self.address, false).await
     }
 
+    /// In Hz, so that a family whose unit nobody knows, or is another one, tells nothing.
     async fn measured(&self, line: &Mailbox<Error>) -> Result<Option<Frequencies>, Error> {
-        self.speeds.frequencies(&line.taken_for(&self.family), self.address, false).await
+        let rule = Rule::of(self.profile(), self.is_unverified);
+        let of_role = |role| self.profile().role(role).filter(|entry| rule.read(entry).is_ok());
+        let names: Vec<_> = ["frequency", "setpoint"].into_iter().filter_map(of_role).map(Entry::name).collect();
+        let profile = match self.call(line).settled(line, &names).await {
+            Ok(settled) => Arc::clone(settled.profile()),
+            Err(NotSettled::Failed(error)) => return Err(error),
+            Err(_) => return Ok(None),
+        };
+        if profile.role("frequency").is_none_or(|entry| entry.quantity().unit() != "Hz") {
+            return Ok(None);
+        }
+        let is_as_named = Arc::ptr_eq(&profile, self.profile());
+        let speeds = if is_as_named { &self.speeds } else { &Arc::new(Speeds::new(&profile, self.is_unverified)) };
+        speeds.frequencies(&line.taken_for(&self.family), self.address, false).await
     }
 
     async fn ended(&self, line: &Mailbox<Error>, command: Command) -> Result<(), NotHalted<Error>> {

@@ -58,9 +58,8 @@ impl From<NotTold<Self>> for Error {
 }
 
 /// What identifies `unit`.
-pub(crate) fn identify(unit: u8) -> Result<Task<Result<Identification, Error>, Error>, Error> {
-    let unit = checks::unit(unit)?;
-    Ok(Task::new(move |line| async move { Ok(drive::identify(&line, Families::shipped(), unit).await?) }))
+pub(crate) fn identify(unit: UnitAddress) -> Task<Result<Identification, Error>, Error> {
+    Task::new(async move |line| Ok(drive::identify(&line, Families::shipped(), unit).await?))
 }
 
 /// What looks at `unit`.
@@ -121,7 +120,7 @@ impl Bus {
     ///
     /// [`Error`]: the unit did not say what it is; nothing of it changed.
     pub fn identify(&self, unit: u8) -> Result<Identification, Error> {
-        self.carry_out(identify(unit)?)
+        self.carry_out(identify(checks::unit(unit)?))
     }
 
     /// Looks at `unit`: what its status words say, in the fewest reads. What no document of its family proves is left out,

@@ -44,6 +44,37 @@ pub struct Running {
     is_over: bool,
 }
 
+impl Drive {
+    /// Starts the motor as [`run`](Self::run) does, for as long as what it returns lives: a motor that is started so is
+    /// stopped whatever happens, also by a `?` and by a panic.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`run`](Self::run). Where the motor may turn, it was stopped before this returns; what came of that, the
+    /// message says last.
+    pub fn running(&self, hz: impl Into<Option<f64>>) -> Result<Running, Error> {
+        self.running_with(&Start::run(false, hz.into()))
+    }
+
+    /// As [`running`](Self::running), in whatever way `start` says. A jog is ended by the jog's own ramp, in a family that has
+    /// a command for that.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`running`](Self::running).
+    pub fn running_with(&self, start: &Start) -> Result<Running, Error> {
+        let running = Running::before(self, start);
+        match self.run_with(start) {
+            Ok(()) => Ok(running),
+            Err(error) if error.may_have_acted() => Err(Running::after(error, running.stop())),
+            Err(error) => {
+                running.leave();
+                Err(error)
+            }
+        }
+    }
+}
+
 impl Running {
     /// The motor that `start` is to start.
     pub(crate) fn before(drive: &Drive, start: &Start) -> Self {

@@ -79,7 +79,7 @@ fn is_not_sent_of_a_jog(plant: &Plant) {
 
 #[test]
 fn a_fault_has_a_name_keeps_the_motor_from_starting_and_is_reset() {
-    for family in ["gd350", "vfd500", "ms300", "v20"] {
+    for family in ["gd350", "vfd500", "ms300", "atv312"] {
         let plant = Plant::of(family);
         let drive = &plant.drive;
         assert_eq!(drive.fault().unwrap(), None, "{family}");
@@ -224,6 +224,25 @@ fn values_come_by_name() {
     plant.bus.close();
     assert_eq!(drive.read("P00.03").unwrap_err().kind(), ErrorKind::Port);
     assert_eq!(drive.run(10.0).unwrap_err().kind(), ErrorKind::Port);
+}
+
+/// A1000 Technical Manual, p. 559: o1-03 says in which unit its frequencies are.
+#[test]
+fn what_a_word_means_is_asked_of_the_drive() {
+    let plant = Plant::of("a1000");
+    plant.drive.run(10.0).unwrap();
+    assert!(plant.turns("forward", 10.0));
+    assert_eq!(plant.drive.frequencies().unwrap().unwrap().output, 10.0);
+    assert_eq!(plant.drive.read("running_frequency").unwrap().to_string(), "10.00");
+    let unit = plant.profile.find("o1-03").unwrap().address().unwrap();
+    plant.simulated().set_parameter(unit, 2).unwrap();
+    assert_eq!(plant.drive.frequencies().unwrap(), None, "it tells none in Hz");
+    is_not_set(&plant, "the drive takes it in rpm, not in Hz");
+}
+
+fn is_not_set(plant: &Plant, says: &str) {
+    plant.simulated().take_writes();
+    is_not_sent(plant, plant.drive.set_frequency(20.0), says);
 }
 
 /// Of the commands of a GD3000 only the one that runs it is printed.

@@ -6,12 +6,11 @@ use std::time::Duration;
 
 use drivebus_drive::task::{Outcome, Read, Step, Task, Wish};
 use drivebus_drive::{Identification, Look, Looks};
-use drivebus_drives::{Place, Profile};
+use drivebus_drives::Place;
 use drivebus_line::{CallOptions as LineOptions, Reply, Stats};
 use drivebus_rtu::{Destination, Instant, Request, UnitAddress};
 
 use super::asked::Asked;
-use super::drive::Drive;
 use super::poll::Poll;
 use crate::builder::Builder;
 use crate::bus::once;
@@ -45,15 +44,6 @@ impl Bus {
     pub fn open_as(builder: Builder, port: &str) -> Asked<Self> {
         let port = port.to_owned();
         Asked::apart(move |wanted| builder.open_while(&port, &mut || wanted.load(Ordering::Acquire)).map(Self))
-    }
-
-    /// The drive at `unit`: as [`Bus::drive`](crate::Bus::drive).
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Bus::drive`](crate::Bus::drive).
-    pub fn drive(&self, unit: u8, profile: &Arc<Profile>) -> Result<Drive, Error> {
-        self.0.drive(unit, profile).map(Drive::from)
     }
 
     /// The same bus for who waits in a thread: what it tells at once is asked there.
@@ -140,7 +130,7 @@ impl Bus {
     ///
     /// Those of [`Bus::identify`](crate::Bus::identify).
     pub async fn identify(&self, unit: u8) -> Result<Identification, Error> {
-        self.carry_out(operations::identify(unit)?).await
+        self.carry_out(operations::identify(checks::unit(unit)?)).await
     }
 
     /// Looks at `unit`: as [`Bus::look`](crate::Bus::look).

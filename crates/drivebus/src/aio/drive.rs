@@ -6,7 +6,6 @@ use drivebus_drive::{Contradiction, Frequencies, Identification, Look, Setting, 
 use drivebus_drives::{Fault, Profile, Value};
 
 use super::bus::Bus;
-use super::running::Running;
 use crate::error::Error;
 use crate::halting::Halting;
 use crate::named::Work;
@@ -27,6 +26,17 @@ pub struct Drive {
 impl From<crate::Drive> for Drive {
     fn from(drive: crate::Drive) -> Self {
         Self { bus: drive.bus().aio(), drive }
+    }
+}
+
+impl Bus {
+    /// The drive at `unit`: as [`Bus::drive`](crate::Bus::drive).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Bus::drive`](crate::Bus::drive).
+    pub fn drive(&self, unit: u8, profile: &Arc<Profile>) -> Result<Drive, Error> {
+        self.blocking().drive(unit, profile).map(Drive::from)
     }
 }
 
@@ -97,33 +107,6 @@ impl Drive {
     /// Those of [`Drive::run_with`](crate::Drive::run_with).
     pub async fn run_with(&self, start: &Start) -> Result<(), Error> {
         self.bus.carry_out(self.drive.named().start(start)?).await
-    }
-
-    /// As [`Drive::running`](crate::Drive::running). Where this future is dropped while it starts the motor, the motor is
-    /// stopped as by the guard.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Drive::running`](crate::Drive::running).
-    pub async fn running(&self, hz: impl Into<Option<f64>>) -> Result<Running, Error> {
-        self.running_with(&Start::run(false, hz.into())).await
-    }
-
-    /// As [`Drive::running_with`](crate::Drive::running_with).
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Drive::running`](crate::Drive::running).
-    pub async fn running_with(&self, start: &Start) -> Result<Running, Error> {
-        let running = Running::before(self, start);
-        match self.run_with(start).await {
-            Ok(()) => Ok(running),
-            Err(error) if error.may_have_acted() => Err(crate::Running::after(error, running.stop().await)),
-            Err(error) => {
-                running.leave();
-                Err(error)
-            }
-        }
     }
 
     /// As [`Drive::stop`](crate::Drive::stop).

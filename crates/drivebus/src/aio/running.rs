@@ -40,8 +40,37 @@ pub struct Running {
     guard: crate::Running,
 }
 
+impl Drive {
+    /// As [`Drive::running`](crate::Drive::running). Where this future is dropped while it starts the motor, the motor is
+    /// stopped as by the guard.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::running`](crate::Drive::running).
+    pub async fn running(&self, hz: impl Into<Option<f64>>) -> Result<Running, Error> {
+        self.running_with(&Start::run(false, hz.into())).await
+    }
+
+    /// As [`Drive::running_with`](crate::Drive::running_with).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::running`](crate::Drive::running).
+    pub async fn running_with(&self, start: &Start) -> Result<Running, Error> {
+        let running = Running::before(self, start);
+        match self.run_with(start).await {
+            Ok(()) => Ok(running),
+            Err(error) if error.may_have_acted() => Err(crate::Running::after(error, running.stop().await)),
+            Err(error) => {
+                running.leave();
+                Err(error)
+            }
+        }
+    }
+}
+
 impl Running {
-    pub(super) fn before(drive: &Drive, start: &Start) -> Self {
+    fn before(drive: &Drive, start: &Start) -> Self {
         Self { drive: drive.clone(), guard: crate::Running::before(drive.blocking(), start) }
     }
 
@@ -58,7 +87,7 @@ impl Running {
     }
 
     /// Lets the motor do what it does.
-    pub(super) fn leave(self) {
+    fn leave(self) {
         self.guard.leave();
     }
 }
