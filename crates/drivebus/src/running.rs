@@ -88,8 +88,9 @@ impl Running {
     ///
     /// Those of [`Drive::halt`]: the motor may still turn. It is not told again when this is dropped.
     pub fn stop(mut self) -> Result<(), Error> {
+        let ended = self.end();
         self.is_over = true;
-        self.end()
+        ended
     }
 
     /// Lets the motor do what it does.
