@@ -232,17 +232,13 @@ fn what_a_word_means_is_asked_of_the_drive() {
     let plant = Plant::of("a1000");
     plant.drive.run(10.0).unwrap();
     assert!(plant.turns("forward", 10.0));
-    assert_eq!(plant.drive.frequencies().unwrap().unwrap().output, 10.0);
+    assert_eq!(plant.drive.frequencies().unwrap().map(|both| both.output), Some(10.0));
     assert_eq!(plant.drive.read("running_frequency").unwrap().to_string(), "10.00");
-    let unit = plant.profile.find("o1-03").unwrap().address().unwrap();
-    plant.simulated().set_parameter(unit, 2).unwrap();
-    assert_eq!(plant.drive.frequencies().unwrap(), None, "it tells none in Hz");
-    is_not_set(&plant, "the drive takes it in rpm, not in Hz");
-}
-
-fn is_not_set(plant: &Plant, says: &str) {
-    plant.simulated().take_writes();
-    is_not_sent(plant, plant.drive.set_frequency(20.0), says);
+    // Which number means which no page prints.
+    let printed = plant.bus.drive(1, &plant.profile).unwrap();
+    assert_eq!((printed.frequencies().unwrap(), printed.status().unwrap().hz), (None, None));
+    assert_eq!(printed.read("running_frequency").unwrap_err().kind(), ErrorKind::NotAllowed);
+    plant.drive.stop().unwrap();
 }
 
 /// Of the commands of a GD3000 only the one that runs it is printed.
