@@ -21,7 +21,7 @@ impl Given {
     pub(crate) fn of(entry: &Entry, value: &Bound<'_, PyAny>) -> PyResult<Self> {
         // A switch is on or off. Anything else that is told True was meant for another name.
         if value.is_instance_of::<PyBool>() && entry.quantity().high().is_none_or(|high| high.to_string() != "1") {
-            return Err(bad_argument(format!("{} = {}: not a number", entry.name(), shown(value))));
+            return Ok(Self::Decimal(shown(value)));
         }
         Ok(if let Ok(float) = value.cast::<PyFloat>() {
             Self::Float(float.extract()?)
