@@ -52,7 +52,7 @@ impl Bus {
     /// # #[cfg(feature = "sim")] {
     /// let bus = Bus::open("sim://gd350?clock=virtual")?;
     /// let drive = bus.drive(1, &Profile::builtin("gd350")?)?;
-    /// assert_eq!(drive.status()?.to_string(), "stopped, 0.00 of 0.00 Hz");
+    /// assert_eq!(drive.status()?.to_string(), "stopped, 0.00 of 50.00 Hz");
     /// # }
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
