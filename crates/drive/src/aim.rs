@@ -82,14 +82,19 @@ impl Aim {
 
     /// Puts in doubt what it was halted as: what it says now decides, and silence says nothing. Not so where it was.
     pub fn doubt(&self, families: &Families) -> bool {
-        let apart = || Apart::new(self.same.family(), families, self.same.is_trusted());
         self.with(|look| {
             let is_new = !look.is_doubted;
             if is_new {
-                (look.apart, look.is_doubted) = (apart(), true);
+                (look.apart, look.is_doubted) = (self.apart(families, true), true);
             }
             is_new
         })
+    }
+
+    /// The unit, of which nothing was answered yet.
+    fn apart(&self, families: &Families, is_doubted: bool) -> Apart {
+        let apart = Apart::new(self.same.family(), families, self.same.is_trusted());
+        if is_doubted { apart.doubting() } else { apart }
     }
 
     /// As what to halt the unit by `command`; `None` where it did not say yet.

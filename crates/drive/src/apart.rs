@@ -62,6 +62,7 @@ pub struct Apart {
     named: Arc<Family>,
     families: Vec<Arc<Family>>,
     is_trusted: bool,
+    is_doubted: bool,
     /// The last answer to each question.
     answers: Vec<Answer>,
 }
@@ -71,7 +72,14 @@ impl Apart {
     ///
     /// Where `is_trusted`, that name is meant, whatever the unit says: it is taken where nothing else is shown.
     pub fn new(named: &Arc<Family>, families: &Families, is_trusted: bool) -> Self {
-        Self { families: families.with(named), named: Arc::clone(named), is_trusted, answers: Vec::new() }
+        let (families, named) = (families.with(named), Arc::clone(named));
+        Self { families, named, is_trusted, is_doubted: false, answers: Vec::new() }
+    }
+
+    /// The same for a unit that did not take what harms nobody: what it is has to be asked all the same.
+    #[must_use]
+    pub fn doubting(self) -> Self {
+        Self { is_doubted: true, ..self }
     }
 
     /// Whether the unit told anything yet.
@@ -111,6 +119,7 @@ impl Apart {
         }
         if let What::Command(command) = what
             && is_live
+            && !self.is_doubted
             && let Some(verdict) = self.by_harm(&others, command)
         {
             return verdict;

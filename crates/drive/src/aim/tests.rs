@@ -199,3 +199,12 @@ proptest! {
         }
     }
 }
+
+/// Altivar 312 CANopen manual: 2135H is where it is commanded, and no other family's, so that its stop harms nobody.
+#[test]
+fn one_that_did_not_take_what_harms_nobody_has_to_say_what_it_is() {
+    let mut aimed = Aimed::of("atv312");
+    assert_eq!(aimed.stop(gd350), Some(("atv312".to_owned(), Command::Stop)));
+    assert!(aimed.aim.doubt(Families::shipped()));
+    assert_eq!(aimed.stop(gd350), Some(("gd350".to_owned(), Command::Stop)));
+}
