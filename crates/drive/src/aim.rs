@@ -54,7 +54,7 @@ fn titles(families: &[Arc<Family>]) -> String {
     if titles.is_empty() { "a drive of another family".to_owned() } else { titles.join(", ") }
 }
 
-/// The look at one unit that comes before a halt. What was answered is kept between two tries.
+/// The look at one unit that comes before a halt. What was answered is kept between two tries over one connection.
 #[derive(Debug)]
 pub struct Aim {
     same: SameUnit,
@@ -66,13 +66,16 @@ struct Look {
     apart: Apart,
     is_doubted: bool,
     heard: Instant,
+    /// How often the port had been opened again when it was asked last.
+    connection: u64,
 }
 
 impl Aim {
     /// Nothing was asked yet of the unit, as it was named, which may be one of `families` as well.
     pub fn new(same: SameUnit, families: &Families, now: Instant) -> Self {
         let apart = Apart::new(same.family(), families, same.is_trusted());
-        Self { same, look: Mutex::new(Look { apart, is_doubted: false, heard: now }) }
+        let connection = same.identity().connection();
+        Self { same, look: Mutex::new(Look { apart, is_doubted: false, heard: now, connection }) }
     }
 
     /// The line's clock when the unit last answered what it was asked, or may have; at first when this was made.
@@ -97,6 +100,15 @@ impl Aim {
         if is_doubted { apart.doubting() } else { apart }
     }
 
+    /// Forgets what was answered where the port was opened again since: behind it another drive may answer.
+    fn keep_to(&self, connection: u64, families: &Families) {
+        self.with(|look| {
+            if look.connection != connection {
+                (look.apart, look.connection) = (self.apart(families, look.is_doubted), connection);
+            }
+        });
+    }
+
     /// As what to halt the unit by `command`; `None` where it did not say yet.
     ///
     /// # Errors
@@ -116,6 +128,7 @@ impl Aim {
             return Ok(named());
         }
         for _ in 0..QUESTIONS {
+            self.keep_to(line.connection(), families);
             let place = match self.with(|look| look.apart.verdict(what)) {
                 Verdict::Ask(place) => place,
                 Verdict::Take(family) => return self.target(line, family, command).map(Some),
@@ -135,6 +148,7 @@ impl Aim {
                 Err(_) if is_doubted() || self.with(|look| look.apart.is_asked()) => return Ok(None),
                 Err(_) => return Ok(named()),
             };
+            self.keep_to(line.connection(), families);
             let is_telling = self.with(|look| {
                 look.heard = line.now();
                 look.apart.heard(answer)

@@ -317,6 +317,8 @@ impl<E: LineError> Halt<E> {
                 // The line knows the unit by its name, and would hold the words of another family back.
                 is_forced: !self.is_as_named(),
                 timeout: Some(ANSWER_WITHIN),
+                // Behind a port that was opened again another drive may be, which has to say what it is.
+                connection: Some(line.connection()),
                 ..Write::new(self.unit.same().unit(), place, payload)
             };
             let Err(error) = line.write(write).await else {

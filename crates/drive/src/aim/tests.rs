@@ -208,3 +208,16 @@ fn one_that_did_not_take_what_harms_nobody_has_to_say_what_it_is() {
     assert!(aimed.aim.doubt(Families::shipped()));
     assert_eq!(aimed.stop(gd350), Some(("gd350".to_owned(), Command::Stop)));
 }
+
+#[test]
+fn what_was_answered_before_the_port_was_lost_says_nothing_of_who_is_there_now() {
+    let mut aimed = Aimed::of("gd350");
+    aimed.stop(gd350);
+    let asked = aimed.script.places();
+    let mut aimed = Aimed::of("gd350");
+    let mut answers = [gd350(Read::word(UNIT, Place::from(0x2103))), fails(Cause::Port)].into_iter();
+    aimed.take(Command::Stop, |_| answers.next().unwrap()).unwrap_err();
+    aimed.script.connection = 1;
+    aimed.stop(gd350);
+    assert_eq!(aimed.script.places(), asked);
+}
