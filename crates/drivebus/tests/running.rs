@@ -170,7 +170,9 @@ fn stopped_before(family: &str, nth: usize, given: impl Fn(&Drive) -> Given) -> 
     let stop = stop.lock().unwrap().take();
     let was_given = stop.is_some();
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
-    stop.into_iter().for_each(|stop| runtime.block_on(stop).unwrap());
+    for each in stop {
+        runtime.block_on(each).unwrap();
+    }
     (started, was_given, plant)
 }
 
