@@ -10,6 +10,9 @@ use drivebus::{Bus, Profile};
 /// How long a motor is given to reach its speed, and later to come to rest. Ramps take up to ten seconds.
 pub(crate) const LONG: Duration = Duration::from_secs(60);
 
+/// A setpoint of some Hz in each family: what is slow soon stands.
+const SLOW: u16 = 300;
+
 /// What the motor does before it is told to halt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Motion {
@@ -94,7 +97,7 @@ impl Plant {
         }
         if let Some(run) = motion.command() {
             if let Some(speed) = profile.role("setpoints.frequency") {
-                self.write(&bus, (place(speed), 1_000));
+                self.write(&bus, (place(speed), SLOW));
             }
             let (register, _) = profile.command(run).unwrap();
             let first = profile.start_sequence().iter().map(|step| (register, step.word));
