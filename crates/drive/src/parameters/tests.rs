@@ -105,6 +105,15 @@ fn successive_parameters_share_a_request_where_that_is_printed() {
     assert_eq!(bench.script.written(), [(0x800C, vec![70]), (0x800B, vec![50])]);
 }
 
+/// No GD20 page at hand prints that one 10H may write several parameters.
+#[test]
+fn where_nothing_is_printed_of_it_each_goes_by_its_own() {
+    let mut bench = Bench::of("gd20", &[], &[]).trusting();
+    assert!(bench.family.profile().requests().joined.is_none());
+    bench.write(&[("P00.11", Input::Float(5.0)), ("P00.12", Input::Float(7.0))], Store::Ram).unwrap();
+    assert_eq!(bench.script.written(), [(0x800B, vec![50]), (0x800C, vec![70])]);
+}
+
 /// What sets the line or says who commands is written alone, and so is what a drive takes only at rest: GD200A manual, p. 92.
 #[test]
 fn what_decides_more_than_itself_shares_no_request() {
