@@ -4,7 +4,8 @@
 //! out that moves a motor or changes a value, and where it speaks against the family, nothing goes out.
 //!
 //! A port that was lost and opened again may be another one: an adapter plugged in elsewhere, a cable moved to another
-//! machine, where the same address is another drive. So it is asked again then. A stop does not wait for it.
+//! machine, where the same address is another drive. So it is asked again then. A stop waits for it only
+//! where its word may start a drive of another family.
 //!
 //! Families that have an identification code are known by it, and others by which words they answer and which they
 //! refuse: also by what they say where other families have such a code, for that is how one of those gives itself away.

@@ -4,7 +4,8 @@ People name a profile, and mistake one drive for another. So what the unit says 
 out that moves a motor or changes a value, and where it speaks against the profile, nothing goes out.
 
 A port that was lost and opened again may be another one: an adapter plugged in elsewhere, a cable moved to another
-machine, where the same address is another drive. So it is asked again then. A stop does not wait for it.
+machine, where the same address is another drive. So it is asked again then. A stop waits for it only
+where its word may start a drive of another family.
 
 What is asked, and what the answers mean, is decided in the core (`crates/drive`); here are the words for it.
 """
