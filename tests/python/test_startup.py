@@ -87,10 +87,9 @@ def test_a_name_loads_what_it_stands_on() -> None:
     assert ours(modules) == {
         "drivebus",
         "drivebus.lazy_names",
-        "drivebus.attribute_mapping",
         "drivebus.plain_annotations",
-        "drivebus.tables",
         "drivebus.values",
+        "drivebus.values.states",
     }
 
 
@@ -129,7 +128,7 @@ def test_a_stop_is_sent_before_anything_is_loaded_that_it_does_not_need() -> Non
                 "names",
                 "option_order",
                 "option_types",
-                "parallel",
+                "each_drive",
                 "present",
                 "present.error_wording",
                 "present.errors",
@@ -145,6 +144,37 @@ def test_a_stop_is_sent_before_anything_is_loaded_that_it_does_not_need() -> Non
     }
     assert ours(modules, "drivebus.backup") == {"drivebus.backup", "drivebus.backup.drive_backup"}
     assert not ours(modules, "drivebus.aio") | ours(modules, "drivebus.doctor")
+
+
+@pytest.mark.parametrize("family", ["gd350", "vfd500", "acs355"])
+def test_a_halt_finds_all_that_it_needs_loaded_with_the_first_drive(family: str) -> None:
+    """A program that has no file left to open can still stop its motor."""
+    program = f"""
+import sys
+import drivebus
+with drivebus.Bus("sim://{family}?clock=virtual") as bus:
+    drive = bus.drive(1, "{family}", unverified=True)
+    begun = set(sys.modules)
+    for halt in (drive.stop, drive.coast):
+        halt()
+    before = set(sys.modules) - begun
+"""
+    assert ours(loaded(program)) == set()
+
+
+def test_a_motor_that_runs_is_stopped_without_another_module() -> None:
+    program = """
+import sys
+import drivebus
+with drivebus.Simulator({1: "gd350"}, transport="process", clock="virtual") as line, drivebus.Bus(line) as bus:
+    drive = bus.drive(1, "gd350")
+    drive.prepare_control()
+    with drive.running(10.0):
+        begun = set(sys.modules)
+        line.drive(1).trip("OL1")
+    before = set(sys.modules) - begun
+"""
+    assert ours(loaded(program)) == set()
 
 
 def test_the_table_of_commands_names_those_of_each_file() -> None:
