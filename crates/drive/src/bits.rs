@@ -28,6 +28,30 @@ pub enum FieldInput<'a> {
     Label(&'a str),
 }
 
+impl From<bool> for FieldInput<'_> {
+    fn from(is_on: bool) -> Self {
+        Self::Switch(is_on)
+    }
+}
+
+impl From<i32> for FieldInput<'_> {
+    fn from(number: i32) -> Self {
+        Self::Number(i64::from(number))
+    }
+}
+
+impl From<i64> for FieldInput<'_> {
+    fn from(number: i64) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl<'a> From<&'a str> for FieldInput<'a> {
+    fn from(label: &'a str) -> Self {
+        Self::Label(label)
+    }
+}
+
 /// Why bits were not set. `E` is the error of whoever drives.
 ///
 /// But for [`NotCommanded`](Self::NotCommanded) and [`NotWritten`](Self::NotWritten), nothing was sent that changes anything.

@@ -14,7 +14,7 @@ use crate::unit::Unit;
 
 /// Why a drive is not set to obey the bus. `E` is the error of whoever drives.
 ///
-/// But for [`NotKept`](Self::NotKept) and [`Unshown`](Self::Unshown), nothing was written.
+/// But for [`NotKept`](Self::NotKept), [`Unread`](Self::Unread) and [`Unshown`](Self::Unshown), nothing was written.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum NotPrepared<E> {
@@ -38,6 +38,9 @@ pub enum NotPrepared<E> {
     /// The unit is not known to have taken it all.
     #[error("{0}")]
     NotKept(NotKept<E>),
+    /// It took the values, and what it has then could not be read.
+    #[error("it took the values, and what it has now could not be read: {0}")]
+    Unread(E),
     /// It took the values, and shows others: all settings as they are then.
     #[error("it took the values, and shows others: {}", told(.0))]
     Unshown(Vec<Setting>),
@@ -72,12 +75,13 @@ impl Unit {
                 needed.push(write);
             }
         }
+        let unread = if needed.is_empty() { NotPrepared::Failed } else { NotPrepared::Unread };
         if !needed.is_empty() {
             let needed: Vec<_> =
                 needed.iter().map(|(code, value)| (code.as_str(), Input::Decimal(value.as_str()))).collect();
             self.write_values(line, families, &needed, store).await.map_err(NotPrepared::NotKept)?;
         }
-        let settings = self.control(line, setpoint).await.map_err(NotPrepared::Failed)?;
+        let settings = self.control(line, setpoint).await.map_err(unread)?;
         if settings.iter().all(Setting::is_right) { Ok(settings) } else { Err(NotPrepared::Unshown(settings)) }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --example run_and_stop                            a simulated GD350
-//! cargo run --example run_and_stop -- /dev/ttyUSB0 gd350 1    a real one that obeys the bus. ITS MOTOR TURNS.
+//! cargo run --example run_and_stop -- /dev/ttyUSB0 gd350 1    a real one. ITS MOTOR TURNS.
 //! ```
 #![allow(clippy::print_stdout, reason = "an example shows what it does")]
 
@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use drivebus::{Bus, Drive, Profile};
+use drivebus::{Bus, Profile};
 
 const RUNS: Duration = Duration::from_secs(10);
 
@@ -28,8 +28,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let bus = Bus::open(&port)?;
     let drive = bus.drive(unit, &Profile::builtin(&family)?)?;
-    set_by_hand(&drive)?;
     println!("{}", drive.identify()?);
+    drive.prepare()?; // it obeys the bus until it is switched off
 
     let running = drive.running(10.0)?;
     let until = bus.now() + RUNS;
@@ -39,15 +39,5 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     running.stop()?; // an error: the motor may still turn
     println!("told to stop: {}", drive.status()?);
-    Ok(())
-}
-
-/// Sets a simulated drive to obey the bus, as somebody does at the keypad of a real one.
-fn set_by_hand(drive: &Drive) -> Result<(), Box<dyn std::error::Error>> {
-    let Some(simulator) = drive.bus().simulator() else { return Ok(()) };
-    for setting in drive.control()? {
-        let address = drive.profile().find(&setting.wanted.code)?.address().ok_or("no address is known")?;
-        simulator.drive(drive.unit())?.set_parameter(address, setting.wanted.raw).map_err(|_| "it is refused")?;
-    }
     Ok(())
 }

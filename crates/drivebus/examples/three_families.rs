@@ -2,13 +2,13 @@
 //!
 //! ```text
 //! cargo run --example three_families                    simulated ones
-//! cargo run --example three_families -- /dev/ttyUSB0    real ones, units 1 to 3, that obey the bus. THEIR MOTORS TURN.
+//! cargo run --example three_families -- /dev/ttyUSB0    real ones, units 1 to 3. THEIR MOTORS TURN.
 //! ```
 #![allow(clippy::print_stdout, reason = "an example shows what it does")]
 
 use std::time::Duration;
 
-use drivebus::{Bus, Drive, Error, Profile};
+use drivebus::{Bus, Drive, Error, Profile, Setpoint, Store};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let simulated = "sim://1=gd350,2=vfd500,3=ms300?clock=virtual".to_owned();
@@ -16,11 +16,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (unit, family) in [(1, "gd350"), (2, "vfd500"), (3, "ms300")] {
         // Of some families documents do not print all that is needed.
         let drive = bus.drive(unit, &Profile::builtin(family)?)?.unverified();
-        set_by_hand(&drive)?;
         if let Some(against) = drive.contradiction()? {
             println!("unit {unit} is no {family}: {against}");
             continue;
         }
+        // It shall obey the bus: in RAM, where it is known how to write to that alone.
+        let store = if drive.profile().memory().is_some() { Store::Ram } else { Store::Eeprom };
+        drive.prepare_for(Setpoint::Frequency, store)?;
         match turn(&drive) {
             Ok(()) => println!("unit {unit}, {family}: {}", drive.status()?),
             Err(error) if error.may_have_acted() => println!("unit {unit} MAY TURN: {error}"),
@@ -36,14 +38,4 @@ fn turn(drive: &Drive) -> Result<(), Error> {
     drive.bus().sleep(Duration::from_secs(10));
     println!("unit {}: {}", drive.unit(), running.status()?);
     running.stop()
-}
-
-/// Sets a simulated drive to obey the bus, as somebody does at the keypad of a real one.
-fn set_by_hand(drive: &Drive) -> Result<(), Box<dyn std::error::Error>> {
-    let Some(simulator) = drive.bus().simulator() else { return Ok(()) };
-    for setting in drive.control()? {
-        let address = drive.profile().find(&setting.wanted.code)?.address().ok_or("no address is known")?;
-        simulator.drive(drive.unit())?.set_parameter(address, setting.wanted.raw).map_err(|_| "it is refused")?;
-    }
-    Ok(())
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --example tokio_drives                    simulated ones
-//! cargo run --example tokio_drives -- /dev/ttyUSB0    real GD350, units 1 and 2, that obey the bus. THEIR MOTORS TURN.
+//! cargo run --example tokio_drives -- /dev/ttyUSB0    real GD350, units 1 and 2. THEIR MOTORS TURN.
 //! ```
 #![allow(clippy::print_stdout, reason = "an example shows what it does")]
 
@@ -19,7 +19,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let gd350 = Profile::builtin("gd350")?;
     let drives = [bus.drive(1, &gd350)?, bus.drive(2, &gd350)?];
     for drive in &drives {
-        set_by_hand(drive).await?;
+        drive.prepare().await?; // it obeys the bus until it is switched off
     }
     let tasks = drives.map(|drive| {
         tokio::spawn(async move {
@@ -44,14 +44,4 @@ async fn turn(drive: &Drive) -> Result<(), Error> {
     drive.bus().sleep(Duration::from_secs(10)).await?;
     println!("unit {}: {}", drive.unit(), running.status().await?);
     running.stop().await
-}
-
-/// Sets a simulated drive to obey the bus, as somebody does at the keypad of a real one.
-async fn set_by_hand(drive: &Drive) -> Result<(), Box<dyn std::error::Error>> {
-    let Some(simulator) = drive.bus().blocking().simulator() else { return Ok(()) };
-    for setting in drive.control().await? {
-        let address = drive.profile().find(&setting.wanted.code)?.address().ok_or("no address is known")?;
-        simulator.drive(drive.unit())?.set_parameter(address, setting.wanted.raw).map_err(|_| "it is refused")?;
-    }
-    Ok(())
 }

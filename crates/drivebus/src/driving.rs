@@ -23,10 +23,8 @@ use crate::status::Status;
 ///
 /// # #[cfg(feature = "sim")] {
 /// let bus = Bus::open("sim://gd350?clock=virtual")?;
-/// # for (address, word) in [(0x8001, 2), (0x8006, 8)] {
-/// #     bus.write(1, address, word)?; // it obeys the bus, and takes its frequency from there
-/// # }
 /// let drive = bus.drive(1, &Profile::builtin("gd350")?)?;
+/// drive.prepare()?; // it obeys the bus until it is switched off
 /// drive.run(10.0)?; // it turns
 /// drive.stop()?; // it slows down along its ramp
 /// # }
@@ -159,10 +157,8 @@ impl Drive {
     ///
     /// # #[cfg(feature = "sim")] {
     /// let bus = Bus::open("sim://gd350?clock=virtual")?;
-    /// # for (address, word) in [(0x8001, 2), (0x8006, 8)] {
-    /// #     bus.write(1, address, word)?; // it obeys the bus, and takes its frequency from there
-    /// # }
     /// let drive = bus.drive(1, &Profile::builtin("gd350")?)?;
+    /// drive.prepare()?;
     /// let mut start = Start::run(true, Some(5.0));
     /// start.confirm = Duration::from_secs(3); // it is looked at for so long until it turns
     /// drive.run_with(&start)?;
@@ -277,6 +273,7 @@ impl Drive {
     }
 
     /// Whether the drive is set to obey the bus, and to take its frequency from there: each setting, with what it is.
+    /// [`prepare`](Self::prepare) sets them.
     ///
     /// # Errors
     ///

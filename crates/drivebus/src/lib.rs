@@ -9,10 +9,8 @@
 //! use drivebus::{Bus, Profile};
 //!
 //! let bus = Bus::open("sim://gd350?clock=virtual")?; // a real line: "/dev/ttyUSB0", "COM3", "socket://host:port"
-//! # for (address, word) in [(0x8001, 2), (0x8006, 8)] {
-//! #     bus.write(1, address, word)?; // it obeys the bus, and takes its frequency from there
-//! # }
 //! let drive = bus.drive(1, &Profile::builtin("gd350")?)?;
+//! drive.prepare()?; // it obeys the bus until it is switched off
 //! let running = drive.running(10.0)?; // at 10 Hz; what `running` is dropped by stops the motor: `?`, a panic
 //! bus.sleep(Duration::from_secs(5)); // on the line's clock
 //! assert_eq!(running.status()?.to_string(), "forward, 10.00 of 10.00 Hz");
@@ -22,7 +20,8 @@
 //! ```
 //!
 //! What is checked before a motor starts: that the drive is what it was named as, obeys the bus, is in no fault, and is
-//! reached so well that its stop would be. [`Drive::run`] has the list, and [`Drive::control`] tells how a drive is set.
+//! reached so well that its stop would be. [`Drive::run`] has the list, [`Drive::control`] tells how a drive is set, and
+//! [`Drive::prepare`] sets it. [`Drive::write`] writes values by name, parameters to RAM so that no EEPROM wears out.
 //! A start is sent once. A halt is sent until the drive takes it, before all that wait for the line, and returns when the
 //! drive shows it.
 //!
@@ -64,8 +63,7 @@
 //!
 //! # Limits
 //!
-//! - It sets no drive up: [`Drive::control`] tells what is set otherwise, and who stands beside it sets that. Parameters by
-//!   name, backups, and the drive's own watchdog are in the Python package.
+//! - Backups, and the drive's own watchdog, are in the Python package.
 //! - A process that is killed stops no motor. Whoever needs that sets the drive's own time-out of the bus.
 //! - It is no safety function. An emergency stop is a wire.
 
@@ -77,9 +75,11 @@ mod bus;
 mod checks;
 mod driving;
 mod error;
+mod given;
 mod halting;
 mod named;
 mod not_done;
+mod not_kept;
 mod operations;
 mod options;
 mod payload;
@@ -90,6 +90,7 @@ mod running;
 #[cfg(feature = "sim")]
 mod simulated;
 mod status;
+mod writes;
 
 pub use builder::Builder;
 pub use bus::Bus;
@@ -110,8 +111,8 @@ pub use drivebus_rtu as rtu;
 #[cfg(feature = "sim")]
 pub use drivebus_sim as sim;
 
-pub use drive::{Frequencies, Look, Setting, Start};
-pub use drives::{Fault, Profile, State, Value};
+pub use drive::{FieldInput, Frequencies, Look, Setting, Start};
+pub use drives::{Fault, Input, Profile, Setpoint, State, Store, Value};
 #[cfg(feature = "serial")]
 pub use line::rs485::Rs485;
 pub use line::{AdapterEcho, ErrorKind, Link, Opener, Share, Stats, UnitOptions};

@@ -5,14 +5,15 @@ use std::time::Duration;
 
 use drivebus_drive::task::{Mailbox, Read, Task};
 use drivebus_drive::{
-    self as drive, Contradiction, Families, Family, Frequencies, Halt, Identification, Look, Looks, NotHalted,
-    NotSettled, Order, Record, Rule, SameUnit, Setting, Speeds, Start, Taken,
+    self as drive, Contradiction, Families, Family, FieldInput, Frequencies, Halt, Identification, Look, Looks,
+    NotHalted, NotPrepared, NotSettled, Order, Record, Rule, SameUnit, Setting, Speeds, Start, Taken,
 };
-use drivebus_drives::{Command, Entry, Fault, Profile, Setpoint};
+use drivebus_drives::{Command, Entry, Fault, Input, Profile, Setpoint, Store};
 use drivebus_rtu::UnitAddress;
 
 use crate::checks;
 use crate::error::Error;
+use crate::given::{Given, GivenField};
 use crate::halting::Halting;
 use crate::operations;
 use crate::reading::{Reading, Values};
@@ -179,6 +180,54 @@ impl Named {
                 words.extend(line.read(Read::words(named.address, place, count)).await?);
             }
             Ok(reading.values(&words))
+        }))
+    }
+
+    pub(crate) fn prepare(&self, setpoint: Setpoint, store: Store) -> Work<Vec<Setting>> {
+        let named = self.clone();
+        Task::new(async move |line| {
+            let prepared = named.call(&line).prepare(&line, Families::shipped(), setpoint, store).await;
+            prepared.map_err(|why| match why {
+                NotPrepared::NotKept(why) => why.into(),
+                why => named.tell("settings", why.into()),
+            })
+        })
+    }
+
+    pub(crate) fn write<'a, V: Into<Input<'a>>>(
+        &self,
+        values: impl IntoIterator<Item = (&'a str, V)>,
+        store: Store,
+    ) -> Result<Work<()>, Error> {
+        let given = |(name, value): (&str, V)| Ok((name.to_owned(), Given::of(value.into())?));
+        let given = values.into_iter().map(given).collect::<Result<Vec<_>, Error>>()?;
+        let named = self.clone();
+        Ok(Task::new(async move |line| {
+            let wanted: Vec<_> = given.iter().map(|(name, value)| (name.as_str(), value.input())).collect();
+            Ok(named.call(&line).write_values(&line, Families::shipped(), &wanted, store).await?)
+        }))
+    }
+
+    pub(crate) fn give(&self, setpoint: Setpoint, value: Input<'_>) -> Result<Work<()>, Error> {
+        let (named, value) = (self.clone(), Given::of(value)?);
+        Ok(Task::new(async move |line| {
+            let given = named.call(&line).give_setpoint(&line, Families::shipped(), setpoint, value.input()).await;
+            given.map_err(|why| named.tell(setpoint.name(), why.into()))
+        }))
+    }
+
+    pub(crate) fn set_bits<'a, V: Into<FieldInput<'a>>>(
+        &self,
+        setpoint: Setpoint,
+        bits: impl IntoIterator<Item = (&'a str, V)>,
+    ) -> Result<Work<()>, Error> {
+        let given = |(name, value): (&str, V)| Ok((name.to_owned(), GivenField::of(value.into())?));
+        let given = bits.into_iter().map(given).collect::<Result<Vec<_>, Error>>()?;
+        let named = self.clone();
+        Ok(Task::new(async move |line| {
+            let bits: Vec<_> = given.iter().map(|(name, value)| (name.as_str(), value.input())).collect();
+            let set = named.call(&line).set_bits(&line, Families::shipped(), setpoint, &bits, false).await;
+            set.map_err(|why| named.tell(setpoint.name(), why.into()))
         }))
     }
 

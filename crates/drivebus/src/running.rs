@@ -15,10 +15,8 @@ use crate::error::Error;
 ///
 /// # #[cfg(feature = "sim")] {
 /// let bus = Bus::open("sim://gd350?clock=virtual")?;
-/// # for (address, word) in [(0x8001, 2), (0x8006, 8)] {
-/// #     bus.write(1, address, word)?; // it obeys the bus, and takes its frequency from there
-/// # }
 /// let drive = bus.drive(1, &Profile::builtin("gd350")?)?;
+/// drive.prepare()?;
 /// let running = drive.running(10.0)?;
 /// running.set_frequency(20.0)?; // an error here, or a panic, stops the motor
 /// println!("{}", running.status()?);

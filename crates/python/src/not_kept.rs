@@ -20,7 +20,7 @@ pub(crate) fn not_prepared(py: Python<'_>, why: NotPrepared<Failed>) -> PyResult
         NotPrepared::NoSetpoint => ("no_setpoint", py.None()),
         NotPrepared::ByHand(left) => ("by_hand", setting(*left).into_py_any(py)?),
         NotPrepared::MayNot { setting: wanted, .. } => ("may_not", setting(*wanted).into_py_any(py)?),
-        NotPrepared::Failed(error) => return Err(error.into()),
+        NotPrepared::Failed(error) | NotPrepared::Unread(error) => return Err(error.into()),
         NotPrepared::NotKept(error) => ("not_kept", not_kept_told(py, error)?),
         NotPrepared::Unshown(settings) => {
             ("unshown", settings.into_iter().map(setting).collect::<Vec<_>>().into_py_any(py)?)

@@ -74,7 +74,7 @@ pub enum WhyNotKept<E> {
     #[error("it was not written: {0}")]
     Failed(E),
     /// The unit is not known to have taken one, or several that shared a request.
-    #[error("{} was not written: {why}{}", .names.join(", "), shared(.in_force.as_ref()))]
+    #[error("{}: {why}{}", .names.join(", "), shared(.in_force.as_ref()))]
     NotWritten {
         /// What that request was to write.
         names: Vec<String>,

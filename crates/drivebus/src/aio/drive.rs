@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use drivebus_drive::{Contradiction, Frequencies, Identification, Look, Setting, Start};
-use drivebus_drives::{Fault, Profile, Value};
+use drivebus_drive::{Contradiction, FieldInput, Frequencies, Identification, Look, Setting, Start};
+use drivebus_drives::{Fault, Input, Profile, Setpoint, Store, Value};
 
 use super::bus::Bus;
 use crate::error::Error;
@@ -155,6 +155,71 @@ impl Drive {
         self.bus.carry_out(self.drive.named().set_frequency(hz)).await
     }
 
+    /// As [`Drive::prepare`](crate::Drive::prepare).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::prepare`](crate::Drive::prepare).
+    pub async fn prepare(&self) -> Result<Vec<Setting>, Error> {
+        self.prepare_for(Setpoint::Frequency, Store::Ram).await
+    }
+
+    /// As [`Drive::prepare_for`](crate::Drive::prepare_for).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::prepare`](crate::Drive::prepare).
+    pub async fn prepare_for(&self, setpoint: Setpoint, store: Store) -> Result<Vec<Setting>, Error> {
+        self.bus.carry_out(self.drive.named().prepare(setpoint, store)).await
+    }
+
+    /// As [`Drive::write`](crate::Drive::write). Where this future is dropped, what was not sent yet is not written.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::write`](crate::Drive::write).
+    pub async fn write<'a>(&self, name: &'a str, value: impl Into<Input<'a>>) -> Result<(), Error> {
+        self.write_values([(name, value)], Store::Ram).await
+    }
+
+    /// As [`Drive::write_values`](crate::Drive::write_values).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::write_values`](crate::Drive::write_values).
+    pub async fn write_values<'a, V: Into<Input<'a>>>(
+        &self,
+        values: impl IntoIterator<Item = (&'a str, V)>,
+        store: Store,
+    ) -> Result<(), Error> {
+        let work = self.drive.named().write(values, store);
+        self.carry_out_planned(work).await
+    }
+
+    /// As [`Drive::give`](crate::Drive::give).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::give`](crate::Drive::give).
+    pub async fn give<'a>(&self, setpoint: Setpoint, value: impl Into<Input<'a>>) -> Result<(), Error> {
+        let work = self.drive.named().give(setpoint, value.into());
+        self.carry_out_planned(work).await
+    }
+
+    /// As [`Drive::set_bits`](crate::Drive::set_bits).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Drive::set_bits`](crate::Drive::set_bits).
+    pub async fn set_bits<'a, V: Into<FieldInput<'a>>>(
+        &self,
+        setpoint: Setpoint,
+        bits: impl IntoIterator<Item = (&'a str, V)>,
+    ) -> Result<(), Error> {
+        let work = self.drive.named().set_bits(setpoint, bits);
+        self.carry_out_planned(work).await
+    }
+
     /// As [`Drive::frequencies`](crate::Drive::frequencies).
     ///
     /// # Errors
@@ -224,7 +289,7 @@ impl Drive {
     ///
     /// Those of [`Drive::read`](crate::Drive::read).
     pub async fn read(&self, name: &str) -> Result<Value, Error> {
-        self.carry_out_values(self.drive.named().values([name])).await?.only()
+        self.carry_out_planned(self.drive.named().values([name])).await?.only()
     }
 
     /// As [`Drive::values`](crate::Drive::values).
@@ -233,10 +298,10 @@ impl Drive {
     ///
     /// Those of [`Drive::read`](crate::Drive::read).
     pub async fn values<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Values, Error> {
-        self.carry_out_values(self.drive.named().values(names)).await
+        self.carry_out_planned(self.drive.named().values(names)).await
     }
 
-    async fn carry_out_values(&self, work: Result<Work<Values>, Error>) -> Result<Values, Error> {
+    async fn carry_out_planned<T>(&self, work: Result<Work<T>, Error>) -> Result<T, Error> {
         self.bus.carry_out(work?).await
     }
 }

@@ -21,10 +21,8 @@ use crate::error::Error;
 /// # #[tokio::main(flavor = "current_thread")]
 /// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let bus = aio::Bus::open("sim://gd350?clock=virtual").await?;
-/// # for (address, word) in [(0x8001, 2), (0x8006, 8)] {
-/// #     bus.write(1, address, word).await?; // it obeys the bus, and takes its frequency from there
-/// # }
 /// let drive = bus.drive(1, &Profile::builtin("gd350")?)?;
+/// drive.prepare().await?;
 /// let running = drive.running(10.0).await?;
 /// println!("{}", running.status().await?);
 /// running.stop().await?;
