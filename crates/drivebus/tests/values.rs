@@ -106,7 +106,7 @@ fn the_address_says_where_a_value_is_kept() {
         plant.drive.write(name, value).unwrap_or_else(|error| panic!("{family}: {error}"));
         assert_eq!(plant.written(), [(ram, word)], "{family}");
         assert_eq!(plant.simulated().eeprom_writes(), 0, "{family}");
-        assert_eq!(plant.drive.read(name).unwrap().to_f64(), value, "{family}");
+        assert_eq!(plant.drive.read(name).unwrap().to_f64().to_bits(), value.to_bits(), "{family}");
         for _ in 0..2 {
             plant.drive.write_values([(name, value)], Store::Eeprom).unwrap();
         }
