@@ -261,3 +261,6 @@ impl Unit {
         Ok(true)
     }
 }
+
+#[cfg(test)]
+mod tests;

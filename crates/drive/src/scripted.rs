@@ -135,6 +135,52 @@ impl Unit for Keeper {
     }
 }
 
+/// A drive of `family` that has `words`, and takes what is written. Behind a write to where commands go that begins with a
+/// word, it has what stands beside that.
+#[derive(Debug, Clone)]
+pub(crate) struct Obeys {
+    family: Arc<Family>,
+    words: BTreeMap<Place, u16>,
+    shows: Vec<(u16, Place, u16)>,
+}
+
+impl Obeys {
+    pub(crate) fn new(family: &str, words: &[(u16, u16)], shows: &[(u16, u16, u16)]) -> Self {
+        let words = words.iter().map(|&(address, word)| (Place::from(address), word)).collect();
+        let shows = shows.iter().map(|&(told, address, word)| (told, Place::from(address), word)).collect();
+        Self { family: shipped(family), words, shows }
+    }
+
+    /// The same drive, which has these words as well.
+    pub(crate) fn with(mut self, words: &[(u16, u16)]) -> Self {
+        self.words.extend(words.iter().map(|&(address, word)| (Place::from(address), word)));
+        self
+    }
+
+    /// The unit as a call sees it, under this trust; it was not asked yet what it is.
+    pub(crate) fn seen(&self, is_trusted: bool) -> crate::unit::Unit {
+        call(&self.family, &Record::default(), is_trusted)
+    }
+}
+
+impl Unit for Obeys {
+    fn read(&mut self, read: Read, _: Instant) -> Reply {
+        match self.words.get(&read.place) {
+            Some(&word) => Ok(word),
+            None => like(&self.family, &[])(read),
+        }
+    }
+
+    fn write(&mut self, write: &Write, _: Instant) -> Result<(), Fault> {
+        let first = words_of(write).first().copied();
+        if self.family.commands_at(write.place) {
+            let shown = self.shows.iter().filter(|(told, ..)| first == Some(*told));
+            self.words.extend(shown.map(|&(_, place, word)| (place, word)));
+        }
+        Ok(())
+    }
+}
+
 /// The words that `write` carries.
 pub(crate) fn words_of(write: &Write) -> Vec<u16> {
     match &write.payload {
