@@ -32,16 +32,18 @@ pub(super) enum Shown {
 }
 
 impl Shown {
-    async fn is_shown_by<E: LineError>(self, look: &Look, line: &Mailbox<E>, unit: &Unit) -> Result<bool, E> {
+    /// Whether a look shows it, before which the motor turned at `output` Hz.
+    fn is_shown_by(self, look: &Look, output: Option<f64>) -> bool {
         let is_untold = look.word.is_none();
         match self {
-            Self::NoFault => Ok(!look.is_tripped() && (is_untold || look.state != State::Unknown)),
-            Self::Turns(_) | Self::TurnsRound { .. } if is_untold => Ok(!look.has_fault()),
-            Self::Turns(wanted) => Ok(look.state == wanted),
-            Self::TurnsRound { wanted, .. } if look.state == wanted => Ok(true),
+            Self::NoFault => !look.is_tripped() && (is_untold || look.state != State::Unknown),
+            Self::Turns(_) | Self::TurnsRound { .. } if is_untold => !look.has_fault(),
+            Self::Turns(wanted) => look.state == wanted,
+            Self::TurnsRound { wanted, .. } if look.state == wanted => true,
+            // What trips, or is told to stop by somebody else, slows down as well, or shows no frequency at all.
             Self::TurnsRound { from, .. } => {
-                let now = unit.output(line).await?;
-                Ok(now.zip(from).is_some_and(|(now, from)| now < from))
+                let slows_down = output.zip(from).is_some_and(|(now, from)| now < from);
+                slows_down && look.state.is_running() && !look.is_tripped()
             }
         }
     }
@@ -149,8 +151,9 @@ impl Unit {
     }
 
     async fn look_for<E: LineError>(&self, line: &Mailbox<E>, shown: Shown) -> Result<(Look, bool), E> {
+        let output = if matches!(shown, Shown::TurnsRound { .. }) { self.output(line).await? } else { None };
         let look = self.look(line).await?;
-        let is_shown = shown.is_shown_by(&look, line, self).await?;
+        let is_shown = shown.is_shown_by(&look, output);
         Ok((look, is_shown))
     }
 }

@@ -3,7 +3,7 @@ use drivebus_rtu::Instant;
 use proptest::prelude::*;
 
 use super::*;
-use crate::halt::After;
+use crate::halt::{After, LastLook};
 use crate::ready::Ignores;
 use crate::scripted::{self, Fault, Obeys, Reply, Script, fails, refuses, shipped};
 use crate::setpoint::NotSet;
@@ -297,6 +297,22 @@ fn a_frequency_that_the_drive_does_not_take_is_not_sent() {
     };
     assert!(matches!(unset(&vfd500()), NotSet::NotSettled(NotSettled::Unproved { .. })));
     assert!(matches!(unset(&Obeys::new("gd3000-rectifier", &[], &[])), NotSet::NoRegister));
+}
+
+/// A motor that turns round slows down first. So does one that trips on the way.
+#[test]
+fn what_trips_on_its_way_round_does_not_run() {
+    let turning = |shows: &[(u16, u16, u16)]| {
+        let words = [(0x2103, 0x01A0), (0x2100, 1), (0x2101, 0x40), (0x3000, 5000)];
+        start(&Obeys::new("gd350", &words, shows), false, Start::run(true, None))
+    };
+    // It is on its way, and forward still.
+    assert!(turning(&[(2, 0x3000, 4900)]).done.is_ok());
+    let tripped = turning(&[(2, 0x2100, 4), (2, 0x2102, 3), (2, 0x3000, 0)]);
+    let error = tripped.done.unwrap_err();
+    assert!(matches!(error.why, Why::Unshown(LastLook::Seen { ref look, .. }) if look.is_tripped()), "{error}");
+    // Nor does one that somebody stopped.
+    assert!(turning(&[(2, 0x2100, 3), (2, 0x3000, 0)]).done.is_err());
 }
 
 /// Whatever comes of it, a start goes out once; what the error says of it is so.
