@@ -203,9 +203,14 @@ impl Unit {
         if !was_running {
             self.lead_up(line, families, place, start.confirm).await?;
         }
+        let parts = self.parts();
         match self.give(line, families, command, (place, payload)).await {
             Err(Why::NotWritten(NotWritten::Failed(error))) if error.cause().is_refusal() && !was_running => {
                 return Err(self.refused(line, error).await);
+            }
+            // It took the word that says which way, and runs.
+            Err(Why::NotWritten(NotWritten::Failed(last))) if was_running && self.parts() > parts => {
+                return Err(Why::Unanswered { last, after: self.after(line).await? });
             }
             given => given?,
         }

@@ -104,7 +104,7 @@ impl Unit {
     }
 
     /// What the unit does after a command of which nothing is known.
-    async fn after<E: LineError>(&self, line: &Mailbox<E>) -> Result<After<E>, Why<E>> {
+    pub(super) async fn after<E: LineError>(&self, line: &Mailbox<E>) -> Result<After<E>, Why<E>> {
         match self.look(line).await {
             Ok(look) => Ok(After::Seen(look)),
             Err(error) => Why::unless_of_the_unit(error).map(After::Unread),

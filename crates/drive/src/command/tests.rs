@@ -299,6 +299,38 @@ fn a_frequency_that_the_drive_does_not_take_is_not_sent() {
     assert!(matches!(unset(&Obeys::new("gd3000-rectifier", &[], &[])), NotSet::NoRegister));
 }
 
+/// WJ200 manual, p. 353: a motor that runs turns round by the first of its two words.
+#[test]
+fn the_way_alone_moves_a_motor_that_runs() {
+    let turning = Obeys::new("wj200", &[(0x1003, 1)], &[]);
+    let but = Coil { drive: turning.clone(), refused: Place::new(Table::Coil, 0) };
+    let called = carried_out(Script::new(), turning.seen(true), but, Start::run(true, None));
+    assert_eq!(called.sent(), [coil(1, 1), coil(0, 1)]);
+    let error = called.done.unwrap_err();
+    assert!(error.why.may_have_acted(), "{error}");
+    // At rest it moves nothing.
+    let rests = Obeys::new("wj200", &[], &[]);
+    let but = Coil { drive: rests.clone(), refused: Place::new(Table::Coil, 0) };
+    let called = carried_out(Script::new(), rests.seen(true), but, Start::run(true, None));
+    assert!(!called.done.unwrap_err().why.may_have_acted());
+}
+
+/// A drive that refuses what is written to one place.
+struct Coil {
+    drive: Obeys,
+    refused: Place,
+}
+
+impl scripted::Unit for Coil {
+    fn read(&mut self, read: Read, now: Instant) -> Reply {
+        self.drive.read(read, now)
+    }
+
+    fn write(&mut self, write: &Write, now: Instant) -> Result<(), Fault> {
+        if write.place == self.refused { refuses(0x02) } else { self.drive.write(write, now) }
+    }
+}
+
 /// A motor that turns round slows down first. So does one that trips on the way.
 #[test]
 fn what_trips_on_its_way_round_does_not_run() {
