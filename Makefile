@@ -349,6 +349,7 @@ THREADS ?= 2
 
 model: $(VENV)/.created ## some minutes; see tests/model/README.md
 	$(CARGO) run $(LOCKED) --quiet --release -p drivebus-model -- --deep --threads $(THREADS)
+	DRIVEBUS_SEARCH=2 $(CARGO) test $(LOCKED) --quiet --release -p drivebus-drive --test search -- --test-threads $(THREADS)
 	$(BIN)/python tools/check_model.py --threads $(THREADS)
 
 packages: $(VENV)/.dev ## what a package leaves out shows here
