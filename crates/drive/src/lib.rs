@@ -70,6 +70,8 @@
 //! | `given` | what a drive is given over the bus besides its frequency |
 //! | `bits` | words whose bits are things of their own: terminals, and the special control word |
 //! | `values` | values read by name |
+//! | `status` | what a drive does at one moment |
+//! | `waits` | waiting until a motor has reached its speed, or stands |
 //! | `task` | operations that wait for a line, and how they are driven without one |
 
 #![forbid(unsafe_code)]
@@ -105,10 +107,12 @@ mod settings;
 mod settled;
 mod signatures;
 mod speed;
+mod status;
 mod taken;
 pub mod task;
 mod unit;
 mod values;
+mod waits;
 mod wanted;
 mod writing;
 
@@ -139,9 +143,11 @@ pub use setpoint::NotSet;
 pub use settings::Setting;
 pub use settled::NotSettled;
 pub use speed::{Frequencies, Ramp, STANDSTILL, Speeds};
+pub use status::Status;
 pub use taken::Taken;
 pub use unit::Unit;
 pub use values::{NotRead, Values};
+pub use waits::NotReached;
 pub use writing::{NotWritten, Words};
 
 /// The examples of the README are tests.
