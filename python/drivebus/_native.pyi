@@ -736,8 +736,12 @@ class Unit:
     `"harm"`, and `"may_be"` and the families that it may be, which may be none, `"busy"` as of `identify`, or
     `"failed"` and the error of the line; `"failed"` and the error.
 
+    `"not_reached"`: `"unseen"`; `"untold"` and the role; `"tripped"`, whether the first look showed that, and a status;
+    `"late"` and a status.
+
     A setting is its code, the word that it must hold, the number that it is or None, label, note, whether it is
-    verified, and whether it is set by hand.
+    verified, and whether it is set by hand. A status is a look as of `Looks.look`, the output frequency and the
+    setpoint, each None where the drive does not tell it, and the Unix time at which the first of it was asked for.
     """
 
     def __new__(cls, unit: SameUnit, looks: Looks, record: Record, /) -> Unit:
@@ -771,6 +775,12 @@ class Unit:
         """*hz* as the drive counts it, up to its own maximum. Or `"not_set"`."""
     def settled(self, names: Sequence[str], /) -> Task:
         """All variants that are chosen, with those on which *names* depend. Or `"not_settled"`."""
+    def status(self) -> Task:
+        """What the drive does: a status. Or `"not_settled"`."""
+    def wait_for_speed(self, hz: float | None, tolerance: float, timeout: float, /) -> Task:
+        """Waits until the motor runs at *hz*, None: its setpoint. A status; or `"not_reached"`, `"not_settled"`."""
+    def wait_until_stopped(self, timeout: float, /) -> Task:
+        """Waits until the motor stands. A status; or `"not_reached"`, `"not_settled"`."""
     def prove_link(self) -> Task:
         """Looks at the state where the last exchanges failed. Or `"not_ready"`."""
     def ready(self, by_bus: bool, /) -> Task:

@@ -46,6 +46,7 @@ mod task;
 mod trace;
 mod unit;
 mod values;
+mod waits;
 
 /// But for `ending`, nothing here keeps state outside its objects, and each of those locks for itself: safe without the GIL.
 #[pymodule(gil_used = false)]

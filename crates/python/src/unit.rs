@@ -14,6 +14,7 @@ use crate::not_done::{not_commanded, not_ready, not_set, not_settled, not_writte
 use crate::record::Record;
 use crate::same_unit::SameUnit;
 use crate::task::{Failed, Task};
+use crate::waits::{status, time_limit, waited};
 
 /// One call to a unit; see `python/drivebus/_native.pyi`.
 #[pyclass(name = "Unit", frozen, module = "drivebus._native")]
@@ -115,6 +116,22 @@ impl Unit {
             unit.settled(&line, &names).await
         };
         self.task(work, told)
+    }
+
+    fn status(&self) -> Task {
+        self.task(|unit, line| async move { unit.status(&line).await }, status)
+    }
+
+    #[pyo3(signature = (hz, tolerance, timeout, /))]
+    fn wait_for_speed(&self, hz: Option<f64>, tolerance: f64, timeout: f64) -> Task {
+        let within = time_limit(timeout);
+        self.task(move |unit, line| async move { unit.wait_for_speed(&line, hz, tolerance, within).await }, waited)
+    }
+
+    #[pyo3(signature = (timeout, /))]
+    fn wait_until_stopped(&self, timeout: f64) -> Task {
+        let within = time_limit(timeout);
+        self.task(move |unit, line| async move { unit.wait_until_stopped(&line, within).await }, waited)
     }
 
     fn prove_link(&self) -> Task {

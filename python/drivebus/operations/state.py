@@ -7,11 +7,12 @@ reason is kept: half of a status is better than none.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from drivebus.errors import BadArgument
 from drivebus.look import Look
-from drivebus.operations import registers
+from drivebus.operations import glances, registers, unit_variants
+from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.explained import read_words
 from drivebus.operations.glances import glance, planned, remember
@@ -27,6 +28,7 @@ __all__ = [
     "look",
     "ping",
     "read_off",
+    "shown",
     "state",
     "state_of",
     "state_word",
@@ -88,26 +90,26 @@ async def status(unit: DriveView, *, unverified: bool = False) -> Status:
         NoAnswer, BadAnswer, Refused: See each.
     """
     unit = unit.trusting(unverified)
-    return await _status(unit, await glance(unit))
+    kind, told = await call_core(unit, lambda core: core.status())
+    if kind != "done":
+        raise unit_variants.not_settled(unit, *told)
+    return shown(unit, told)
 
 
-async def _status(unit: DriveView, seen: Look) -> Status:
+def shown(unit: DriveView, told: Any) -> Status:
+    """What *unit* was doing, of which the core *told* as `_native.Unit.status`."""
     from drivebus.values import Status
 
+    look, frequency, setpoint, asked = told
+    seen = glances.shown(unit, look)
     missing = dict(seen.missing)
-    names = {}
     for role in ("frequency", "setpoint"):
         name = unit.profile.role(role)
         reason = f"no such register of {unit.profile.title} is known"
         if name is not None:
             reason = unit.evidence.unreadable(name) or ""
-        if name is None or reason:
+        if reason:
             missing[role] = reason
-        else:
-            names[role] = name
-    frequencies = await registers.snapshot(unit, *names.values()) if names else {}
-    # The state tells the direction; some families have it in the sign as well.
-    told = {role: abs(float(frequencies[name])) for role, name in names.items()}
     motor = seen.fields.get("motor", "")
     ready = seen.fields.get("ready")
     alarm = seen.fields.get("overload_alarm")
@@ -125,11 +127,11 @@ async def _status(unit: DriveView, seen: Look) -> Status:
         source=seen.source,
         motor=int(motor.removeprefix("motor ")) if motor.startswith("motor ") else None,
         overload_alarm=None if alarm is None else alarm != "none",
-        frequency=told.get("frequency"),
-        setpoint=told.get("setpoint"),
+        frequency=frequency,
+        setpoint=setpoint,
         fault=seen.fault,
         fields=seen.fields,
-        time=seen.time or getattr(frequencies, "time", 0.0),
+        time=asked,
         missing=missing,
     )
 

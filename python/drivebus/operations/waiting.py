@@ -1,18 +1,22 @@
-"""Waiting until a motor has reached its speed, or stands."""
+"""Waiting until a motor has reached its speed, or stands.
+
+What is asked meanwhile, and what ends the wait, is decided in the core (`crates/drive`); here are its words.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Any
 
 from drivebus import checks
-from drivebus.errors import BadArgument, NotReached, Unconfirmed
-from drivebus.look import STANDSTILL
-from drivebus.operations import state
+from drivebus.errors import BadArgument, DrivebusError, NotAllowed, NotReached, Unconfirmed
+from drivebus.operations import state, unit_variants
+from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
-from drivebus.operations.glances import POLL_INTERVAL
-from drivebus.values import State, Status
+from drivebus.values import Status
 
 __all__ = ["check_standstill", "wait_for_speed", "wait_until_stopped"]
+
+_STANDSTILL = "waiting for the standstill"
 
 
 async def wait_for_speed(
@@ -35,32 +39,13 @@ async def wait_for_speed(
     """
     wanted = None if hz is None else checks.number("frequency", hz, 0.0)
     tolerance = checks.number("tolerance", tolerance, 0.0)
+    timeout = checks.number("timeout", timeout, 0.0)
     goal = "its setpoint" if wanted is None else f"{wanted:g} Hz"
-
-    def reached(status: Status) -> bool:
-        target = status.setpoint if wanted is None else wanted
-        if status.frequency is None or target is None:
-            return False
-        # Hundredths are what drives count in; binary floats must not turn 0.1 into a miss.
-        return status.state.running and abs(status.frequency - target) <= tolerance + 1e-9
-
     unit = unit.trusting(unverified)
-    _check_told(unit, "waiting for the speed", "frequency", *(["setpoint"] if wanted is None else []))
-    return await _wait(unit, reached, f"{goal} was not reached", timeout)
-
-
-def _check_told(unit: DriveView, what: str, *roles: str) -> None:
-    """Raises `NotAllowed` if the family does not tell its state, or one of *roles*."""
-    state.state_word(unit, what)
-    for role in roles:
-        name = unit.profile.role(role)
-        if name is None:
-            raise BadArgument(
-                f"{what} of unit {unit.address} needs its {role}, and {unit.profile.title} has no register of it that "
-                "is known",
-                unit=unit.address,
-            )
-        unit.evidence.require_readable([name])
+    kind, told = await call_core(unit, lambda core: core.wait_for_speed(wanted, tolerance, timeout))
+    if kind != "done":
+        raise _in_words(unit, "waiting for the speed", f"{goal} was not reached within {timeout:g} s", kind, told)
+    return state.shown(unit, told)
 
 
 async def wait_until_stopped(unit: DriveView, timeout: float = 60.0, *, unverified: bool = False) -> Status:
@@ -74,36 +59,46 @@ async def wait_until_stopped(unit: DriveView, timeout: float = 60.0, *, unverifi
         Unconfirmed: The drive tripped meanwhile.
         NoAnswer, BadAnswer, PortError: The line failed; the drive goes on as it was.
     """
-
-    def stopped(status: Status) -> bool:
-        turns = status.frequency is not None and status.frequency > STANDSTILL
-        return status.state.at_rest and not turns
-
+    timeout = checks.number("timeout", timeout, 0.0)
     unit = unit.trusting(unverified)
-    check_standstill(unit, timeout)
-    return await _wait(unit, stopped, "it did not stop", timeout)
+    kind, told = await call_core(unit, lambda core: core.wait_until_stopped(timeout))
+    if kind != "done":
+        raise _in_words(unit, _STANDSTILL, f"it did not stop within {timeout:g} s", kind, told)
+    return state.shown(unit, told)
 
 
 def check_standstill(unit: DriveView, timeout: float) -> None:
     """Raises `NotAllowed` if `wait_until_stopped` would, before anything moves."""
     checks.number("timeout", timeout, 0.0)
-    _check_told(unit, "waiting for the standstill")
+    state.state_word(unit, _STANDSTILL)
 
 
-async def _wait(unit: DriveView, reached: Callable[[Status], bool], otherwise: str, timeout: float) -> Status:
-    timeout = checks.number("timeout", timeout, 0.0)
-    deadline = unit.bus.now() + timeout
-    tripped = "tripped before the wait"
-    while True:
-        status = await state.status(unit)
-        if status.state is State.FAULT or status.fault is not None:
-            raise Unconfirmed(f"unit {unit.address} {tripped}: {status.fault or 'fault not named'}", unit=unit.address)
-        tripped = "tripped while waiting"
-        if reached(status):
-            return status
-        if unit.bus.now() >= deadline:
-            raise NotReached(
-                f"unit {unit.address}: {otherwise} within {timeout:g} s; it is {status}",
+def _in_words(unit: DriveView, what: str, late: str, kind: str, told: Any) -> DrivebusError:
+    """Why *what* came to nothing, which was *late*: *kind* and *told* as `_native.Unit` has them."""
+    if kind == "not_settled":
+        return unit_variants.not_settled(unit, *told)
+    why, of_it = told
+    if why in ("unseen", "untold"):
+        return _untold(unit, what, of_it)
+    if why == "tripped":
+        was_before, seen = of_it
+        when = "before the wait" if was_before else "while waiting"
+        fault = state.shown(unit, seen).fault or "fault not named"
+        return Unconfirmed(f"unit {unit.address} tripped {when}: {fault}", unit=unit.address)
+    return NotReached(f"unit {unit.address}: {late}; it is {state.shown(unit, of_it)}", unit=unit.address)
+
+
+def _untold(unit: DriveView, what: str, role: str | None) -> NotAllowed:
+    """Why *what* needs the *role*, None: the state, of a family that does not tell it."""
+    try:
+        name = state.state_word(unit, what) if role is None else unit.profile.role(role)
+        if name is None:
+            return BadArgument(
+                f"{what} of unit {unit.address} needs its {role}, and {unit.profile.title} has no register of it that "
+                "is known",
                 unit=unit.address,
             )
-        await unit.bus.sleep(POLL_INTERVAL)
+        unit.evidence.require_readable([name])
+    except NotAllowed as error:
+        return error
+    raise RuntimeError(f"{name} of {unit.profile.name} may be read")
