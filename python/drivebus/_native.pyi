@@ -790,6 +790,7 @@ class Unit:
     def heeds(self, setpoint: str, /) -> Task:
         """What must be set so that the drive heeds *setpoint*: settings."""
 
+@final
 class Values:
     """The values of a unit as one call to it writes them, by name.
 
