@@ -171,6 +171,12 @@ impl Task {
     }
 }
 
+/// That a call was carried out, and what it says.
+pub(crate) fn is_done<'py>(py: Python<'py>, value: impl IntoPyObject<'py>) -> PyResult<Py<PyAny>> {
+    let value = value.into_bound_py_any(py)?;
+    ("done", value).into_py_any(py)
+}
+
 /// What a later core says or wants besides.
 pub(crate) fn unknown(what: &impl Debug) -> PyErr {
     PyRuntimeError::new_err(format!("nothing here knows of {what:?}"))

@@ -3,7 +3,6 @@
 use drivebus_drive::task::{Mailbox, Payload};
 use drivebus_drive::{self as drive, Families, Setting, Start, Words};
 use drivebus_drives::{Place, Setpoint};
-use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
 use crate::clock::duration;
@@ -13,7 +12,7 @@ use crate::look::Looks;
 use crate::not_done::{not_commanded, not_ready, not_set, not_settled, not_written, setting};
 use crate::record::Record;
 use crate::same_unit::SameUnit;
-use crate::task::{Failed, Task};
+use crate::task::{Failed, Task, is_done};
 use crate::waits::{status, time_limit, waited};
 
 /// One call to a unit; see `python/drivebus/_native.pyi`.
@@ -180,11 +179,6 @@ pub(crate) fn setpoint_of(name: &str) -> PyResult<Setpoint> {
 
 fn none(py: Python<'_>) -> PyResult<Py<PyAny>> {
     is_done(py, ())
-}
-
-pub(crate) fn is_done<'py>(py: Python<'py>, value: impl IntoPyObject<'py>) -> PyResult<Py<PyAny>> {
-    let value = value.into_bound_py_any(py)?;
-    ("done", value).into_py_any(py)
 }
 
 fn settings(py: Python<'_>, done: Result<Vec<Setting>, Failed>) -> PyResult<Py<PyAny>> {

@@ -9,8 +9,8 @@ use crate::errors::refuse;
 use crate::given::Given;
 use crate::not_done::setting;
 use crate::not_kept::{not_given, not_kept, not_prepared, not_set_bits};
-use crate::task::{Failed, Task};
-use crate::unit::{Unit, is_done, setpoint_of};
+use crate::task::{Failed, Task, is_done};
+use crate::unit::{Unit, setpoint_of};
 
 /// The values of a unit, as one call sees it; see `python/drivebus/_native.pyi`.
 #[pyclass(name = "Values", frozen, module = "drivebus._native")]

@@ -8,8 +8,7 @@ use pyo3::prelude::*;
 
 use crate::not_done::{Told, not_settled};
 use crate::shown_look::{Shown, shown};
-use crate::task::{Failed, unknown};
-use crate::unit::is_done;
+use crate::task::{Failed, is_done, unknown};
 
 /// A look, the frequency at the output, the setpoint, and when the first of it was asked for.
 type Moment = (Shown, Option<f64>, Option<f64>, f64);
