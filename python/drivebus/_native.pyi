@@ -49,6 +49,7 @@ __all__ = [
     "Values",
     "__version__",
     "all_frames_in",
+    "begin_families",
     "begin_of_child",
     "check_port_options",
     "code_places",

@@ -32,19 +32,13 @@ pub(super) enum Shown {
 }
 
 impl Shown {
-    /// Whether a look shows it, before which the motor turned at `output` Hz.
-    fn is_shown_by(self, look: &Look, output: Option<f64>) -> bool {
+    /// Whether a look alone shows it.
+    fn is_shown_by(self, look: &Look) -> bool {
         let is_untold = look.word.is_none();
         match self {
             Self::NoFault => !look.is_tripped() && (is_untold || look.state != State::Unknown),
             Self::Turns(_) | Self::TurnsRound { .. } if is_untold => !look.has_fault(),
-            Self::Turns(wanted) => look.state == wanted,
-            Self::TurnsRound { wanted, .. } if look.state == wanted => true,
-            // What trips, or is told to stop by somebody else, slows down as well, or shows no frequency at all.
-            Self::TurnsRound { from, .. } => {
-                let slows_down = output.zip(from).is_some_and(|(now, from)| now < from);
-                slows_down && look.state.is_running() && !look.is_tripped()
-            }
+            Self::Turns(wanted) | Self::TurnsRound { wanted, .. } => look.state == wanted,
         }
     }
 }
@@ -151,9 +145,26 @@ impl Unit {
     }
 
     async fn look_for<E: LineError>(&self, line: &Mailbox<E>, shown: Shown) -> Result<(Look, bool), E> {
-        let output = if matches!(shown, Shown::TurnsRound { .. }) { self.output(line).await? } else { None };
         let look = self.look(line).await?;
-        let is_shown = shown.is_shown_by(&look, output);
-        Ok((look, is_shown))
+        match shown {
+            Shown::TurnsRound { from: Some(from), .. } if !shown.is_shown_by(&look) && comes_round(&look) => {
+                if self.output(line).await?.is_none_or(|now| now >= from) {
+                    return Ok((look, false));
+                }
+                // What trips, or is told to stop by somebody else, slows down as well.
+                let again = self.look(line).await?;
+                let is_shown = shown.is_shown_by(&again) || comes_round(&again);
+                Ok((again, is_shown))
+            }
+            _ => {
+                let is_shown = shown.is_shown_by(&look);
+                Ok((look, is_shown))
+            }
+        }
     }
+}
+
+/// Whether a motor that slows down may do so to turn the other way.
+fn comes_round(look: &Look) -> bool {
+    look.state.is_running() && !look.is_tripped()
 }
