@@ -50,11 +50,6 @@ class UnitRecord:
         return self.sent.starts
 
     @property
-    def halts_begun(self) -> int:
-        """How many stops, of whatever kind, were about to go out."""
-        return self.sent.halts_begun
-
-    @property
     def halts(self) -> int:
         """How many stops have gone out."""
         return self.sent.halts
