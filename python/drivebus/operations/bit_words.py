@@ -15,6 +15,7 @@ from drivebus.operations import bus_control, not_commanded, not_ready, not_writt
 from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.explained import read_words
+from drivebus.profile.evidence import refusal_of
 
 __all__ = ["bits", "inputs", "outputs", "set_virtual_inputs", "set_virtual_outputs", "special_control"]
 
@@ -133,19 +134,15 @@ def _not_set(unit: DriveView, setpoint: str, given: Mapping[str, object], kind: 
         name, choices = told
         allowed = ", ".join(f"{number} = {label}" for number, label in choices.items())
         return BadArgument(f"{name} is {checks.shown(given[name])}, which {register} cannot be; allowed is {allowed}")
-    try:
-        if kind == "no_field":
-            name, known = told
-            checks.one_of(f"bit of {register}", name, known)
-        elif kind == "unproved":
-            unit.evidence.require_bits(register, told)
-        elif kind == "unreadable":
-            unit.evidence.require_readable([register])
-        else:
-            unit.evidence.require_writable(register)
-    except NotAllowed as error:
-        return error
-    known = ", ".join(_masks(unit, register)) or "no bits that are known"
+    if kind == "no_field":
+        return refusal_of(checks.one_of, f"bit of {register}", *told)
+    if kind == "unproved":
+        return refusal_of(unit.evidence.require_bits, register, told)
+    if kind == "unreadable":
+        return refusal_of(unit.evidence.require_readable, [register])
+    if kind == "may_not":
+        return refusal_of(unit.evidence.require_writable, register)
+    known = ", ".join(unit.profile.fields(register, 0)) or "no bits that are known"
     return BadArgument(f"nothing to set was named; {register} has {known}")
 
 

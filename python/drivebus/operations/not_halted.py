@@ -12,6 +12,7 @@ from drivebus.operations.aim import profiles_of, undecided
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.said import MAY, said
 from drivebus.operations.seen import afterwards, frames_of
+from drivebus.profile.evidence import refusal_of
 from drivebus.values import ControlSource
 
 __all__ = ["in_words"]
@@ -59,11 +60,7 @@ def _not_sent(named: DriveView, unit: DriveView, command: str, reason: str, told
     if reason == "failed":
         failed: DrivebusError = told
         return failed
-    try:
-        unit.evidence.require_command(command)
-    except NotAllowed as error:
-        return error
-    raise RuntimeError(f"{command} may be given to {unit.profile.name}")
+    return refusal_of(unit.evidence.require_command, command)
 
 
 def _unsaid(unit: DriveView, command: str) -> DrivebusError:

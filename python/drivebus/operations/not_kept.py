@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from drivebus import checks
 from drivebus.advice import Advice, Text, argument, call, joined
-from drivebus.errors import BadArgument, DrivebusError, NotAllowed, NotReady
+from drivebus.errors import BadArgument, DrivebusError, NotReady
 from drivebus.operations import not_written, unit_variants
 from drivebus.operations.drive_view import DriveView
+from drivebus.profile.evidence import refusal_of
 from drivebus.values import State
 
 __all__ = ["in_words", "written_before"]
@@ -95,18 +96,10 @@ def _not_planned(unit: DriveView, name: str, kind: str, word: int | None, *, sto
             unit=unit.address,
         )
     if kind == "no_range":
-        return _raised(lambda: unit.evidence.require_writable_word(name, word or 0))
+        return refusal_of(unit.evidence.require_writable_word, name, word or 0)
     if kind == "may_not_keep":
-        return _raised(lambda: unit.evidence.require_kept(name, store=store))
-    return _raised(lambda: unit.evidence.require_writable(name))
-
-
-def _raised(check: Callable[[], None]) -> NotAllowed:
-    try:
-        check()
-    except NotAllowed as error:
-        return error
-    raise RuntimeError("it may be written")
+        return refusal_of(unit.evidence.require_kept, name, store=store)
+    return refusal_of(unit.evidence.require_writable, name)
 
 
 def _unsays(unit: DriveView, name: str, variant: str, chosen: str, *, given: Any) -> BadArgument:

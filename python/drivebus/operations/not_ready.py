@@ -13,10 +13,10 @@ from drivebus.errors import BadLink, DrivebusError, NotReady
 from drivebus.line.stats import Link
 from drivebus.operations import bus_control, glances
 from drivebus.operations.drive_view import DriveView
-from drivebus.profile.evidence import Evidence
+from drivebus.profile.evidence import Evidence, refusal_of
 from drivebus.values import Control
 
-__all__ = ["can_be_stopped", "in_words"]
+__all__ = ["in_words"]
 
 _SET_OTHERWISE = {
     "words": "has its words elsewhere",
@@ -34,8 +34,12 @@ def in_words(unit: DriveView, command: str | None, kind: str, told: Any) -> Driv
         kind: Of which kind the reason is, as `_native.Unit.start` has it.
         told: What is told of it.
     """
-    if kind in ("may_not", "unseen", "unstoppable"):
-        return _may_not(unit, command)
+    if kind == "may_not":
+        return refusal_of(unit.evidence.require_command, command)
+    if kind == "unseen":
+        return _unseen(unit)
+    if kind == "unstoppable":
+        return _unstoppable(unit)
     if kind == "bad_link":
         link, lost, looks = told
         return _bad_link(unit, Link(*link), lost, looks)
@@ -81,33 +85,21 @@ def in_words(unit: DriveView, command: str | None, kind: str, told: Any) -> Driv
     )
 
 
-def can_be_stopped(unit: DriveView) -> None:
-    """Raises `NotAllowed` where a motor that turns could not be stopped over the bus."""
-    reasons = {halt: unit.evidence.unusable(halt) for halt in ("stop", "coast")}
-    if all(reasons.values()):
-        told = "; ".join(f"{halt}: {(reason or '').rstrip('.')}" for halt, reason in reasons.items())
-        what = f"a motor that unit {unit.address} starts could not be stopped over the bus"
-        raise unit.evidence.missing(what, told, _both_unusable)
+def _unseen(unit: DriveView) -> DrivebusError:
+    what = f"unit {unit.address} is started by several words, and its state must be seen between them"
+    return unit.evidence.missing(what, unit.evidence.without_state() or "", Evidence.without_state)
+
+
+def _unstoppable(unit: DriveView) -> DrivebusError:
+    reasons = {halt: unit.evidence.unusable(halt) or "" for halt in ("stop", "coast")}
+    told = "; ".join(f"{halt}: {reason.rstrip('.')}" for halt, reason in reasons.items())
+    what = f"a motor that unit {unit.address} starts could not be stopped over the bus"
+    return unit.evidence.missing(what, told, _both_unusable)
 
 
 def _both_unusable(evidence: Evidence) -> str | None:
     """Why a motor could not be stopped; None if it could."""
     return evidence.unusable("stop") and evidence.unusable("coast")
-
-
-def _may_not(unit: DriveView, command: str | None) -> DrivebusError:
-    """What forbids *command* by the family's documents."""
-    try:
-        if command is not None:
-            unit.evidence.require_command(command)
-            unseen = unit.evidence.without_state()
-            if unit.profile.start_sequence() and unseen is not None and command != "reset_fault":
-                what = f"unit {unit.address} is started by several words, and its state must be seen between them"
-                return unit.evidence.missing(what, unseen, Evidence.without_state)
-        can_be_stopped(unit)
-    except DrivebusError as error:
-        return error
-    raise RuntimeError(f"{command} may be given to {unit.profile.name}")
 
 
 def _bad_link(unit: DriveView, link: Link, lost: int, looks: int) -> BadLink:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from drivebus import _native, checks
-from drivebus.errors import BadArgument, DrivebusError, NotAllowed
+from drivebus.errors import BadArgument, DrivebusError
 from drivebus.operations import (
     bus_control,
     not_kept,
@@ -23,6 +23,7 @@ from drivebus.operations import (
 from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
+from drivebus.profile.evidence import refusal_of
 
 __all__ = [
     "SetpointRange",
@@ -257,14 +258,12 @@ def not_set(unit: DriveView, hz: float, kind: str, told: Any) -> DrivebusError:
             f"allowed is 0 to {highest:g} Hz. No setpoint was sent to unit {unit.address}",
             unit=unit.address,
         )
-    try:
-        register = register_of(unit, "frequency")
-        if kind == "not_in_hz":
-            return _not_in_hz(unit, register, told)
-        unit.evidence.require_writable(register)
-    except NotAllowed as error:
-        return error
-    raise RuntimeError(f"the frequency of {unit.profile.name} may be written")
+    if kind == "no_register":
+        return refusal_of(register_of, unit, "frequency")
+    register = register_of(unit, "frequency")
+    if kind == "not_in_hz":
+        return _not_in_hz(unit, register, told)
+    return refusal_of(unit.evidence.require_writable, register)
 
 
 def _counted(unit: DriveView, hz: float) -> int:

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Set
 from typing import Any
 
 from drivebus.advice import Advice, Text
-from drivebus.errors import DrivebusError, NotAllowed, NotReady
+from drivebus.errors import DrivebusError, NotReady
 from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
-from drivebus.profile.evidence import Evidence, not_verified
+from drivebus.profile.evidence import Evidence, not_verified, refusal_of
 from drivebus.profile.facts import Variant
 
 __all__ = ["given", "is_open", "not_settled", "rules", "settled", "undecided"]
@@ -71,11 +71,7 @@ def not_settled(unit: DriveView, kind: str, told: Any) -> DrivebusError:
             why="settings",
             unit=unit.address,
         )
-    try:
-        unit.evidence.require_readable([parameter])
-    except NotAllowed as error:
-        return error
-    raise RuntimeError(f"{parameter} of {unit.profile.name} may be read")
+    return refusal_of(unit.evidence.require_readable, [parameter])
 
 
 def _rules(evidence: Evidence) -> Mapping[str, Variant]:

@@ -12,6 +12,7 @@ from drivebus.errors import BadArgument, DrivebusError, NotAllowed, NotReached, 
 from drivebus.operations import state, unit_variants
 from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
+from drivebus.profile.evidence import refusal_of
 from drivebus.values import Status
 
 __all__ = ["check_standstill", "wait_for_speed", "wait_until_stopped"]
@@ -90,15 +91,12 @@ def _in_words(unit: DriveView, what: str, late: str, kind: str, told: Any) -> Dr
 
 def _untold(unit: DriveView, what: str, role: str | None) -> NotAllowed:
     """Why *what* needs the *role*, None: the state, of a family that does not tell it."""
-    try:
-        name = state.state_word(unit, what) if role is None else unit.profile.role(role)
-        if name is None:
-            return BadArgument(
-                f"{what} of unit {unit.address} needs its {role}, and {unit.profile.title} has no register of it that "
-                "is known",
-                unit=unit.address,
-            )
-        unit.evidence.require_readable([name])
-    except NotAllowed as error:
-        return error
-    raise RuntimeError(f"{name} of {unit.profile.name} may be read")
+    if role is None:
+        return refusal_of(state.state_word, unit, what)
+    name = unit.profile.role(role)
+    if name is not None:
+        return refusal_of(unit.evidence.require_readable, [name])
+    return BadArgument(
+        f"{what} of unit {unit.address} needs its {role}, and {unit.profile.title} has no register of it that is known",
+        unit=unit.address,
+    )

@@ -14,7 +14,7 @@ from drivebus.advice import Text, argument
 from drivebus.errors import BadArgument, NotAllowed, Unverified
 from drivebus.profile.profile import Profile, native_of
 
-__all__ = ["Evidence", "not_verified"]
+__all__ = ["Evidence", "not_verified", "refusal_of"]
 
 _T = TypeVar("_T")
 
@@ -35,6 +35,15 @@ def not_verified(what: str, reason: str | None, unit: int) -> NotAllowed:
         ),
         unit=unit,
     )
+
+
+def refusal_of(check: Callable[..., object], *args: object, **kwargs: object) -> NotAllowed:
+    """The error by which *check* refuses what it is given, where the core has said that it does."""
+    try:
+        check(*args, **kwargs)
+    except NotAllowed as error:
+        return error
+    raise RuntimeError(f"{check.__qualname__} refuses neither {args} nor {kwargs}")
 
 
 class Evidence:
