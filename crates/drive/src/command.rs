@@ -25,9 +25,6 @@ use sent::Shown;
 
 type Why<E> = WhyNotCommanded<E>;
 
-/// Time between two looks at the state.
-const POLL_INTERVAL: Duration = Duration::from_millis(20);
-
 /// How a motor is to be started.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]

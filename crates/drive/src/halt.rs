@@ -23,11 +23,11 @@ use crate::aim::{ANSWER_WITHIN, Aim, NotTaken, Target};
 use crate::asked::NotTold;
 use crate::families::Families;
 use crate::huanyang::may_be_of;
+use crate::look::POLL_INTERVAL;
 use crate::record::Record;
 use crate::taken::Taken;
 use crate::task::{Cause, LineError, Mailbox, Notice, Payload, Write};
-pub(crate) use proof::LONG_LOOK;
-use proof::{POLL_INTERVAL, Proof};
+use proof::Proof;
 
 /// Time between a frame that came to nothing at once, and the next.
 const PAUSE: Duration = Duration::from_millis(40);

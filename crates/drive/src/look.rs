@@ -9,10 +9,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_drives::{BitField, Entry, Fault, Profile, ReadPlan, State};
-use drivebus_rtu::UnitAddress;
+use drivebus_rtu::{Instant, UnitAddress};
 
+use crate::planned::read_planned;
 use crate::rule::{Rule, WhyNot};
-use crate::task::{Mailbox, Read};
+use crate::task::Mailbox;
 
 /// What a look at units of one family reads, under one trust. Worked out once, and used for every look.
 #[derive(Debug)]
@@ -74,6 +75,17 @@ impl Look {
     pub fn fault_of<'p>(&self, profile: &'p Profile) -> Option<Cow<'p, Fault>> {
         self.fault.filter(|&number| number != 0).map(|number| profile.fault(number))
     }
+}
+
+/// Time between two looks at a drive.
+pub(crate) const POLL_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Time that a look takes only where it waits until nothing that is late can be mistaken.
+const LONG_LOOK: Duration = Duration::from_millis(500);
+
+/// The moment for which a look counts that took from `began` until `ended`: what was seen before a long wait is old.
+pub(crate) fn counts_for(began: Instant, ended: Instant) -> Instant {
+    if ended.saturating_duration_since(began) < LONG_LOOK { ended } else { began }
 }
 
 /// Where a drive may take its commands from besides the bus, as the bits of a status word say it.
@@ -196,15 +208,8 @@ impl Looks {
     ///
     /// Those of the line; the drive goes on as it was.
     pub async fn look<E>(&self, line: &Mailbox<E>, unit: UnitAddress, is_urgent: bool) -> Result<Look, E> {
-        let mut asked = None;
-        let mut came = Vec::new();
-        for span in self.plan.iter().flat_map(ReadPlan::reads) {
-            let read = Read::words(unit, span.place(), span.count).urgent(is_urgent);
-            let stamped = line.read_stamped(read).await?;
-            asked.get_or_insert(stamped.asked);
-            came.extend(stamped.words);
-        }
-        Ok(self.shown(&came, asked.unwrap_or_default()))
+        let came = read_planned(self.plan.as_ref(), line, unit, is_urgent).await?;
+        Ok(self.shown(&came.words, came.asked))
     }
 
     /// What the words of all reads show, which were `asked` for then.

@@ -6,14 +6,12 @@ use drivebus_drives::State;
 use drivebus_rtu::Instant;
 use thiserror::Error;
 
+use crate::look::POLL_INTERVAL;
 use crate::speed::STANDSTILL;
 use crate::status::Status;
 use crate::task::{LineError, Mailbox};
 use crate::unit::Unit;
 use crate::values::NotRead;
-
-/// Time between two looks at the drive.
-const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Hundredths of a hertz are what drives count in: a difference of binary floats must not turn 0.1 into a miss.
 const ROUNDING: f64 = 1e-9;

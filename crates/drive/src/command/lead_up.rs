@@ -7,11 +7,10 @@ use std::time::Duration;
 
 use drivebus_drives::{Place, StartWord};
 
-use super::POLL_INTERVAL;
 use super::not_commanded::{NotLedUp, WhyNotCommanded, WhyNotLedUp};
 use crate::families::Families;
 use crate::halt::LastLook;
-use crate::look::Look;
+use crate::look::{Look, POLL_INTERVAL};
 use crate::task::{Cause, LineError, Mailbox, Payload};
 use crate::unit::Unit;
 use crate::writing::Words;

@@ -8,11 +8,10 @@ use std::time::Duration;
 use drivebus_drives::{Command, Place, State};
 use drivebus_rtu::Instant;
 
-use super::POLL_INTERVAL;
 use super::not_commanded::WhyNotCommanded;
 use crate::families::Families;
-use crate::halt::{After, LONG_LOOK, LastLook};
-use crate::look::Look;
+use crate::halt::{After, LastLook};
+use crate::look::{Look, POLL_INTERVAL, counts_for};
 use crate::task::{Cause, LineError, Mailbox, Notice, Payload};
 use crate::unit::Unit;
 use crate::writing::{NotWritten, Words};
@@ -129,10 +128,7 @@ impl Unit {
             Ok((_, true)) => return Ok(true),
             Ok((look, false)) => {
                 let is_over = look.has_fault() && !matches!(shown, Shown::NoFault);
-                let ended = line.now();
-                // What was seen before a long wait for an answer that cannot be mistaken is old: that look is not the last.
-                let is_short = ended.saturating_duration_since(began) < LONG_LOOK;
-                (LastLook::Seen { look, hz: None }, is_over, if is_short { ended } else { began })
+                (LastLook::Seen { look, hz: None }, is_over, counts_for(began, line.now()))
             }
             Err(error) => match error.cause() {
                 Cause::Port => return Err(Why::PortLost(error)),

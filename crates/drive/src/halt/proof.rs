@@ -7,20 +7,14 @@ use drivebus_rtu::Instant;
 
 use super::not_halted::{LastLook, Why};
 use crate::fall::{Fall, Glimpse};
-use crate::look::Look;
+use crate::look::{Look, POLL_INTERVAL, counts_for};
 use crate::record::Record;
 use crate::speed::Ramp;
 use crate::taken::Taken;
 use crate::task::{Cause, LineError, Mailbox};
 
-/// Time between two looks at the state.
-pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(20);
-
 /// The same, where it takes longer than it was given. Each look goes before all who wait, as the halt did.
 const LONGER_INTERVAL: Duration = Duration::from_millis(100);
-
-/// Time that a look takes only where it waits until nothing that is late can be mistaken.
-pub(crate) const LONG_LOOK: Duration = Duration::from_millis(500);
 
 /// What is seen of one unit that took a halt.
 #[derive(Debug)]
@@ -81,12 +75,7 @@ impl Proof {
         let began = line.now();
         let (last, looked_at) = match self.see(line, unit, record).await {
             Ok((_, true)) => return Ok(true),
-            Ok((look, false)) => {
-                let ended = line.now();
-                // What was seen before a long wait for an answer that cannot be mistaken is old: that look is not the last.
-                let is_short = ended.saturating_duration_since(began) < LONG_LOOK;
-                (LastLook::Seen { look, hz: self.fall.frequency() }, if is_short { ended } else { began })
-            }
+            Ok((look, false)) => (LastLook::Seen { look, hz: self.fall.frequency() }, counts_for(began, line.now())),
             // A refusal here is one of a read: it says nothing about the command.
             Err(error) => match error.cause() {
                 Cause::NoAnswer | Cause::BadAnswer | Cause::Refused(..) => (LastLook::Unread(error), line.now()),
