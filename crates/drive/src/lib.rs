@@ -56,6 +56,7 @@
 //! | `aim` | as what a unit is halted, and whether a word may be sent to it |
 //! | `record` | what was sent to a unit, and what it said of itself |
 //! | `halt` | a halt: sent until the unit takes it, and proved |
+//! | `planned` | the words of a read plan, one span after the other |
 //! | `look` | what the status words of a drive say |
 //! | `speed` | how fast a motor turns, and how its drive slows it down |
 //! | `taken`, `unit` | a unit as the family that it is taken for, and as one call sees it |
@@ -95,6 +96,7 @@ pub mod huanyang;
 mod identify;
 mod look;
 mod parameters;
+mod planned;
 mod prepare;
 mod ready;
 mod record;

@@ -7,6 +7,7 @@ use crate::families::Families;
 use crate::settled::NotSettled;
 use crate::task::{LineError, Mailbox, Payload};
 use crate::unit::Unit;
+use crate::values::NotRead;
 use crate::writing::{NotWritten, Words};
 
 /// Why a frequency was not given. `E` is the error of whoever drives. But for [`NotSet::NotWritten`], nothing was written.
@@ -91,12 +92,13 @@ impl Unit {
         self.rule().write(register).map_err(|why| NotSet::MayNot(why.to_string()))?;
         let word = register.encode(hz).map_err(NotSet::Unfit)?;
         let Some(limit) = quantity.high_from() else { return Ok(word) };
-        let Some(entry) = self.profile().find(limit).ok().filter(|entry| self.rule().read(entry).is_ok()) else {
-            return Ok(word);
+        let came = match self.read_values(line, &[limit]).await {
+            Ok(came) => came.values,
+            Err(NotRead::Unknown(_) | NotRead::MayNot { .. }) => return Ok(word),
+            Err(NotRead::NotSettled(why)) => return Err(NotSet::NotSettled(why)),
+            Err(NotRead::Failed(error)) => return Err(NotSet::Failed(error)),
         };
-        let unit = self.settled(line, &[limit]).await.map_err(NotSet::NotSettled)?;
-        let highest = unit.values(line, &[entry]).await.map_err(NotSet::Failed)?.first().copied();
-        match highest {
+        match came.first().copied() {
             Some(highest) if hz > highest.to_f64() => Err(NotSet::Above { limit: limit.to_owned(), highest }),
             _ => Ok(word),
         }

@@ -8,6 +8,7 @@ use drivebus_rtu::UnitAddress;
 
 use crate::family::Family;
 use crate::look::Look;
+use crate::planned::read_planned;
 use crate::record::Record;
 use crate::rule::Rule;
 use crate::same_unit::SameUnit;
@@ -144,14 +145,9 @@ impl Unit {
 
     /// The values of `entries`, which may be read, in their order and in the fewest reads.
     pub(crate) async fn values<E>(&self, line: &Mailbox<E>, entries: &[&Entry]) -> Result<Vec<Value>, E> {
-        let line = line.taken_for(self.family());
         // What may be read has an address.
         let Ok(plan) = self.profile().compile(entries) else { return Ok(Vec::new()) };
-        let mut words = Vec::with_capacity(plan.words());
-        for span in plan.reads() {
-            let read = Read::words(self.address(), span.place(), span.count);
-            words.extend(line.read_stamped(read).await?.words);
-        }
-        Ok(plan.values(&words).filter_map(|(_, value)| value).collect())
+        let came = read_planned(Some(&plan), &line.taken_for(self.family()), self.address(), false).await?;
+        Ok(plan.values(&came.words).filter_map(|(_, value)| value).collect())
     }
 }

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use drivebus_drives::{NameError, Profile, ReadPlan, Value};
+use drivebus_drives::{NameError, Profile, Value};
 use thiserror::Error;
 
+use crate::planned::read_planned;
 use crate::settled::NotSettled;
-use crate::task::{LineError, Mailbox, Read};
+use crate::task::{LineError, Mailbox};
 use crate::unit::Unit;
 
 /// Values that were read, and when.
@@ -64,17 +65,10 @@ impl Unit {
         // They have names, and what may be read can be.
         let entries: Vec<_> = names.iter().filter_map(|name| profile.resolve(name).ok()).collect();
         let plan = profile.compile(&entries.iter().map(AsRef::as_ref).collect::<Vec<_>>()).ok();
-        let (mut came, mut asked, mut answered) = (Vec::new(), None, Duration::ZERO);
         let line = line.taken_for(self.family());
-        for span in plan.iter().flat_map(ReadPlan::reads) {
-            let read = Read::words(self.address(), span.place(), span.count);
-            let stamped = line.read_stamped(read).await.map_err(NotRead::Failed)?;
-            asked.get_or_insert(stamped.asked);
-            answered = stamped.answered;
-            came.extend(stamped.words);
-        }
-        let values = plan.iter().flat_map(|plan| plan.values(&came)).filter_map(|(_, value)| value).collect();
-        Ok(Values { values, profile: Arc::clone(profile), asked: asked.unwrap_or_default(), answered })
+        let came = read_planned(plan.as_ref(), &line, self.address(), false).await.map_err(NotRead::Failed)?;
+        let values = plan.iter().flat_map(|plan| plan.values(&came.words)).filter_map(|(_, value)| value).collect();
+        Ok(Values { values, profile: Arc::clone(profile), asked: came.asked, answered: came.answered })
     }
 }
 

@@ -1,6 +1,7 @@
 use super::*;
 use crate::record::Record;
 use crate::scripted::{Fault, Keeper, Script, call, refuses, shipped};
+use crate::task::Read;
 
 fn read(
     name: &str,
