@@ -8,12 +8,12 @@ use drivebus_drive::{
     self as drive, Contradiction, Families, Family, FieldInput, Frequencies, Halt, Identification, Look, Looks,
     NotHalted, NotPrepared, NotSettled, Order, Record, Rule, SameUnit, Setting, Speeds, Start, Taken,
 };
-use drivebus_drives::{Command, Entry, Fault, Input, Profile, Setpoint, Store};
+use drivebus_drives::{Command, Entry, Fault, Input, OwnedInput, Profile, Setpoint, Store};
 use drivebus_rtu::UnitAddress;
 
 use crate::checks;
 use crate::error::Error;
-use crate::given::{Given, GivenField};
+use crate::given::GivenField;
 use crate::halting::Halting;
 use crate::operations;
 use crate::reading::{Reading, Values};
@@ -198,22 +198,22 @@ impl Named {
         &self,
         values: impl IntoIterator<Item = (&'a str, V)>,
         store: Store,
-    ) -> Result<Work<()>, Error> {
-        let given = |(name, value): (&str, V)| Ok((name.to_owned(), Given::of(value.into())?));
-        let given = values.into_iter().map(given).collect::<Result<Vec<_>, Error>>()?;
+    ) -> Work<()> {
+        let given = |(name, value): (&str, V)| (name.to_owned(), OwnedInput::from(value.into()));
+        let given: Vec<_> = values.into_iter().map(given).collect();
         let named = self.clone();
-        Ok(Task::new(async move |line| {
+        Task::new(async move |line| {
             let wanted: Vec<_> = given.iter().map(|(name, value)| (name.as_str(), value.input())).collect();
             Ok(named.call(&line).write_values(&line, Families::shipped(), &wanted, store).await?)
-        }))
+        })
     }
 
-    pub(crate) fn give(&self, setpoint: Setpoint, value: Input<'_>) -> Result<Work<()>, Error> {
-        let (named, value) = (self.clone(), Given::of(value)?);
-        Ok(Task::new(async move |line| {
+    pub(crate) fn give(&self, setpoint: Setpoint, value: Input<'_>) -> Work<()> {
+        let (named, value) = (self.clone(), OwnedInput::from(value));
+        Task::new(async move |line| {
             let given = named.call(&line).give_setpoint(&line, Families::shipped(), setpoint, value.input()).await;
             given.map_err(|why| named.tell(setpoint.name(), why.into()))
-        }))
+        })
     }
 
     pub(crate) fn set_bits<'a, V: Into<FieldInput<'a>>>(

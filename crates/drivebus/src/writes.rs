@@ -108,7 +108,7 @@ impl Drive {
         values: impl IntoIterator<Item = (&'a str, V)>,
         store: Store,
     ) -> Result<(), Error> {
-        self.bus().carry_out(self.named().write(values, store)?)
+        self.bus().carry_out(self.named().write(values, store))
     }
 
     /// Gives another setpoint than the frequency: torque, PID, limits, analog outputs. A motor that runs follows it at once.
@@ -119,7 +119,7 @@ impl Drive {
     ///
     /// Those of [`write`](Self::write); [`NotAllowed`](crate::ErrorKind::NotAllowed) also where the drive would ignore it.
     pub fn give<'a>(&self, setpoint: Setpoint, value: impl Into<Input<'a>>) -> Result<(), Error> {
-        self.bus().carry_out(self.named().give(setpoint, value.into())?)
+        self.bus().carry_out(self.named().give(setpoint, value.into()))
     }
 
     /// Sets bits of the word that takes `setpoint`: [`VirtualInputs`](Setpoint::VirtualInputs),

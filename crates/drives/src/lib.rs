@@ -104,7 +104,7 @@ pub use profile::lookup::NameError;
 pub use profile::read_plan::ReadPlan;
 pub use quantity::Quantity;
 pub use sheet::{Sheet, SheetError, decode, whole_lines};
-pub use value::{Input, Limits, Value, ValueError};
+pub use value::{Input, Limits, OwnedInput, Value, ValueError};
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

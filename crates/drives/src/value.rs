@@ -63,6 +63,43 @@ pub enum Input<'a> {
     Decimal(&'a str),
 }
 
+/// An [`Input`] that is kept.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum OwnedInput {
+    /// See [`Input::Integer`].
+    Integer(i64),
+    /// See [`Input::Float`].
+    Float(f64),
+    /// See [`Input::Text`].
+    Text(String),
+    /// See [`Input::Decimal`].
+    Decimal(String),
+}
+
+impl OwnedInput {
+    /// What it gives.
+    pub fn input(&self) -> Input<'_> {
+        match self {
+            Self::Integer(number) => Input::Integer(*number),
+            Self::Float(number) => Input::Float(*number),
+            Self::Text(text) => Input::Text(text),
+            Self::Decimal(digits) => Input::Decimal(digits),
+        }
+    }
+}
+
+impl From<Input<'_>> for OwnedInput {
+    fn from(input: Input<'_>) -> Self {
+        match input {
+            Input::Integer(number) => Self::Integer(number),
+            Input::Float(number) => Self::Float(number),
+            Input::Text(text) => Self::Text(text.to_owned()),
+            Input::Decimal(digits) => Self::Decimal(digits.to_owned()),
+        }
+    }
+}
+
 impl From<i32> for Input<'_> {
     fn from(number: i32) -> Self {
         Self::Integer(i64::from(number))

@@ -12,7 +12,7 @@ use pyo3::types::PyDict;
 
 use crate::convert::{one_word, place_of, shown};
 use crate::errors::{bad_argument, refuse};
-use crate::given::Given;
+use crate::given::given;
 use crate::plan::Plan;
 use crate::tables::{self, known_as, number};
 
@@ -232,7 +232,7 @@ impl Profile {
     #[pyo3(signature = (name, value, /))]
     fn encode(&self, name: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<u16> {
         let entry = self.find(name)?;
-        entry.encode(Given::of(&entry, value)?.input()).map_err(refuse)
+        entry.encode(given(&entry, value)?.input()).map_err(refuse)
     }
 
     #[pyo3(signature = (name, raw, /))]

@@ -193,7 +193,7 @@ impl Drive {
         store: Store,
     ) -> Result<(), Error> {
         let work = self.drive.named().write(values, store);
-        self.carry_out_planned(work).await
+        self.bus.carry_out(work).await
     }
 
     /// As [`Drive::give`](crate::Drive::give).
@@ -203,7 +203,7 @@ impl Drive {
     /// Those of [`Drive::give`](crate::Drive::give).
     pub async fn give<'a>(&self, setpoint: Setpoint, value: impl Into<Input<'a>>) -> Result<(), Error> {
         let work = self.drive.named().give(setpoint, value.into());
-        self.carry_out_planned(work).await
+        self.bus.carry_out(work).await
     }
 
     /// As [`Drive::set_bits`](crate::Drive::set_bits).
