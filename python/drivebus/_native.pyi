@@ -696,9 +696,6 @@ class Record:
     def starts(self) -> int:
         """How many starts were sent, or were about to be."""
     @property
-    def halts_begun(self) -> int:
-        """How many halts, of whatever kind, were about to go out."""
-    @property
     def halts(self) -> int:
         """How many halts have gone out."""
     @property
@@ -754,8 +751,6 @@ class Unit:
         """Starts the motor, or jogs it, at *hz*; its state is looked at for *confirm* seconds. Or `"not_commanded"`."""
     def reset_fault(self, confirm: float, /) -> Task:
         """Resets a fault, if there is one. Or `"not_commanded"`."""
-    def write_moving(self, place: int, word: int, /) -> Task:
-        """Writes a word that can move the motor. Or `"not_commanded"`."""
     def write(
         self, place: int, value: int | Sequence[int], read_back: int | None, absolute: bool, force: bool, /
     ) -> Task:
@@ -782,14 +777,8 @@ class Unit:
         """Waits until the motor runs at *hz*, None: its setpoint. A status; or `"not_reached"`, `"not_settled"`."""
     def wait_until_stopped(self, timeout: float, /) -> Task:
         """Waits until the motor stands. A status; or `"not_reached"`, `"not_settled"`."""
-    def prove_link(self) -> Task:
-        """Looks at the state where the last exchanges failed. Or `"not_ready"`."""
-    def ready(self, by_bus: bool, /) -> Task:
-        """Whether the drive may start, and where *by_bus* obeys the bus. Or `"not_ready"`."""
     def control(self, setpoint: str, /) -> Task:
         """What must be set so that the bus commands the drive, and gives it *setpoint*: settings."""
-    def heeds(self, setpoint: str, /) -> Task:
-        """What must be set so that the drive heeds *setpoint*: settings."""
 
 @final
 class Values:

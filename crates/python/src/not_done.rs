@@ -24,10 +24,6 @@ pub(crate) fn not_commanded(py: Python<'_>, error: NotCommanded<Failed>) -> PyRe
     ("not_commanded", (command, to_seconds(found), kind, told)).into_py_any(py)
 }
 
-pub(crate) fn not_ready(py: Python<'_>, error: NotReady<Failed>) -> PyResult<Py<PyAny>> {
-    ("not_ready", ready_told(py, error)?).into_py_any(py)
-}
-
 pub(crate) fn not_set(py: Python<'_>, error: NotSet<Failed>) -> PyResult<Py<PyAny>> {
     ("not_set", set_told(py, error)?).into_py_any(py)
 }

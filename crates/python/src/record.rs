@@ -45,11 +45,6 @@ impl Record {
     }
 
     #[getter]
-    fn halts_begun(&self) -> u64 {
-        self.0.sent().halts_begun
-    }
-
-    #[getter]
     fn halts(&self) -> u64 {
         self.0.sent().halts
     }

@@ -177,6 +177,16 @@ pub(crate) fn is_done<'py>(py: Python<'py>, value: impl IntoPyObject<'py>) -> Py
     ("done", value).into_py_any(py)
 }
 
+/// How a call is told: what it says where it was carried out, and else `why` it was not.
+pub(crate) fn or_why<T: for<'py> IntoPyObject<'py>, W>(
+    why: fn(Python<'_>, W) -> PyResult<Py<PyAny>>,
+) -> impl FnOnce(Python<'_>, Result<T, W>) -> PyResult<Py<PyAny>> {
+    move |py, done| match done {
+        Ok(value) => is_done(py, value),
+        Err(error) => why(py, error),
+    }
+}
+
 /// What a later core says or wants besides.
 pub(crate) fn unknown(what: &impl Debug) -> PyErr {
     PyRuntimeError::new_err(format!("nothing here knows of {what:?}"))

@@ -2,23 +2,23 @@
 
 use drivebus_drive::task::{Mailbox, Payload};
 use drivebus_drive::{self as drive, Families, Setting, Start, Words};
-use drivebus_drives::{Place, Setpoint};
+use drivebus_drives::{Place, Profile, Setpoint};
 use pyo3::prelude::*;
 
 use crate::clock::duration;
 use crate::convert::place_of;
 use crate::errors::bad_argument;
 use crate::look::Looks;
-use crate::not_done::{not_commanded, not_ready, not_set, not_settled, not_written, setting};
+use crate::not_done::{not_commanded, not_set, not_settled, not_written, setting};
 use crate::record::Record;
 use crate::same_unit::SameUnit;
-use crate::task::{Failed, Task, is_done};
+use crate::task::{Failed, Task, is_done, or_why};
 use crate::waits::{status, time_limit, waited};
 
 /// One call to a unit; see `python/drivebus/_native.pyi`.
 #[pyclass(name = "Unit", frozen, module = "drivebus._native")]
 #[derive(Debug)]
-pub(crate) struct Unit(pub(crate) drive::Unit);
+pub(crate) struct Unit(drive::Unit);
 
 /// A word, or several.
 #[derive(FromPyObject)]
@@ -44,25 +44,15 @@ impl Unit {
     fn start(&self, jogs: bool, reverse: bool, hz: Option<f64>, confirm: f64, force: bool) -> Task {
         let mut start = if jogs { Start::jog(reverse) } else { Start::run(reverse, hz) };
         (start.confirm, start.is_forced) = (duration(confirm), force);
-        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_commanded(py, why), |()| none(py));
+        let told = or_why(not_commanded);
         self.task(|unit, line| async move { unit.start(&line, Families::shipped(), &start).await }, told)
     }
 
     #[pyo3(signature = (confirm, /))]
     fn reset_fault(&self, confirm: f64) -> Task {
         let confirm = duration(confirm);
-        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_commanded(py, why), |()| none(py));
+        let told = or_why(not_commanded);
         self.task(|unit, line| async move { unit.reset_fault(&line, Families::shipped(), confirm).await }, told)
-    }
-
-    #[pyo3(signature = (place, word, /))]
-    fn write_moving(&self, place: &Bound<'_, PyAny>, word: u16) -> PyResult<Task> {
-        let place = place_of(place)?;
-        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_commanded(py, why), |()| none(py));
-        let moving = move |unit: drive::Unit, line| async move {
-            unit.write_moving(&line, Families::shipped(), place, word).await
-        };
-        Ok(self.task(moving, told))
     }
 
     #[pyo3(signature = (place, value, read_back, absolute, force, /))]
@@ -81,26 +71,25 @@ impl Unit {
         let mut words = Words::once(place_of(place)?, payload);
         words.read_back = read_back.and_then(Place::of_number).map(|place| place.address);
         (words.is_absolute, words.is_forced) = (absolute, force);
-        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_written(py, why), |()| none(py));
+        let told = or_why(not_written);
         Ok(self.task(|unit, line| async move { unit.write(&line, Families::shipped(), &words).await }, told))
     }
 
     #[pyo3(signature = (word, /))]
     fn write_frequency(&self, word: u16) -> Task {
-        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_written(py, why), |()| none(py));
+        let told = or_why(not_written);
         self.task(move |unit, line| async move { unit.write_frequency(&line, Families::shipped(), word).await }, told)
     }
 
     #[pyo3(signature = (hz, /))]
     fn set_frequency(&self, hz: f64) -> Task {
-        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_set(py, why), |()| none(py));
+        let told = or_why(not_set);
         self.task(move |unit, line| async move { unit.set_frequency(&line, Families::shipped(), hz).await }, told)
     }
 
     #[pyo3(signature = (hz, /))]
     fn frequency_word(&self, hz: f64) -> Task {
-        let told =
-            |py: Python<'_>, done: Result<u16, _>| done.map_or_else(|why| not_set(py, why), |word| is_done(py, word));
+        let told = or_why(not_set);
         self.task(move |unit, line| async move { unit.frequency_word(&line, hz).await }, told)
     }
 
@@ -133,32 +122,25 @@ impl Unit {
         self.task(move |unit, line| async move { unit.wait_until_stopped(&line, within).await }, waited)
     }
 
-    fn prove_link(&self) -> Task {
-        let told = |py: Python<'_>, done: Result<(), _>| done.map_or_else(|why| not_ready(py, why), |()| none(py));
-        self.task(|unit, line| async move { unit.prove_link(&line).await }, told)
-    }
-
-    #[pyo3(signature = (by_bus, /))]
-    fn ready(&self, by_bus: bool) -> Task {
-        let told = |py: Python<'_>, done: Result<_, _>| done.map_or_else(|why| not_ready(py, why), |_| none(py));
-        self.task(move |unit, line| async move { unit.ready(&line, by_bus).await }, told)
-    }
-
     #[pyo3(signature = (setpoint, /))]
     fn control(&self, setpoint: &str) -> PyResult<Task> {
         let setpoint = setpoint_of(setpoint)?;
         Ok(self.task(move |unit, line| async move { unit.control(&line, setpoint).await }, settings))
     }
-
-    #[pyo3(signature = (setpoint, /))]
-    fn heeds(&self, setpoint: &str) -> PyResult<Task> {
-        let setpoint = setpoint_of(setpoint)?;
-        Ok(self.task(move |unit, line| async move { unit.heeds(&line, setpoint).await }, settings))
-    }
 }
 
 impl Unit {
-    fn task<T, F>(
+    /// The same call, for more of what may be asked of it.
+    pub(crate) fn again(&self) -> Self {
+        Self(self.0.clone())
+    }
+
+    pub(crate) fn profile(&self) -> &Profile {
+        self.0.profile()
+    }
+
+    /// What `work` asks of the unit, and how it is `told`.
+    pub(crate) fn task<T, F>(
         &self,
         work: impl FnOnce(drive::Unit, Mailbox<Failed>) -> F,
         told: impl FnOnce(Python<'_>, T) -> PyResult<Py<PyAny>> + Send + 'static,
@@ -175,10 +157,6 @@ impl Unit {
 pub(crate) fn setpoint_of(name: &str) -> PyResult<Setpoint> {
     let known = Setpoint::ALL.into_iter().find(|setpoint| setpoint.name() == name);
     known.ok_or_else(|| bad_argument(format!("setpoint {name:?} is none")))
-}
-
-fn none(py: Python<'_>) -> PyResult<Py<PyAny>> {
-    is_done(py, ())
 }
 
 fn settings(py: Python<'_>, done: Result<Vec<Setting>, Failed>) -> PyResult<Py<PyAny>> {
