@@ -135,6 +135,33 @@ impl Unit for Keeper {
     }
 }
 
+/// A unit that is written to, over and over, with the line and the record that it keeps.
+pub(crate) struct Bench {
+    pub(crate) script: Script,
+    pub(crate) record: Record,
+    pub(crate) family: Arc<Family>,
+    pub(crate) keeper: Keeper,
+    pub(crate) is_trusted: bool,
+}
+
+impl Bench {
+    pub(crate) fn of(family: &str, words: &[(u16, u16)]) -> Self {
+        let family = shipped(family);
+        let keeper = Keeper::new(&family, words);
+        Self { script: Script::new(), record: Record::default(), family, keeper, is_trusted: false }
+    }
+
+    /// The same, of whose words all are trusted.
+    pub(crate) fn trusting(self) -> Self {
+        Self { is_trusted: true, ..self }
+    }
+
+    /// A call to it.
+    pub(crate) fn call(&self) -> crate::Unit {
+        call(&self.family, &self.record, self.is_trusted)
+    }
+}
+
 /// A drive of `family` that has `words`, and takes what is written. Behind a write to where commands go that begins with a
 /// word, it has what stands beside that.
 #[derive(Debug, Clone)]

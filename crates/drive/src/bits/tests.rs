@@ -1,12 +1,9 @@
-use std::sync::Arc;
-
 use drivebus_drives::Place;
 
 use super::*;
 use crate::command::WhyNotCommanded;
-use crate::family::Family;
 use crate::record::Record;
-use crate::scripted::{Fault, Keeper, Script, call, fails, refuses, shipped};
+use crate::scripted::{Bench, Fault, call, fails, refuses};
 use crate::task::{Cause, Link};
 
 /// Of a Goodrive350: its code, its state, its virtual inputs and outputs, and its special control.
@@ -18,32 +15,18 @@ const SPECIAL: u16 = 0x2009;
 
 type Given = [(&'static str, FieldInput<'static>)];
 
-/// A unit whose bits are set.
-struct Bench {
-    script: Script,
-    record: Record,
-    family: Arc<Family>,
-    keeper: Keeper,
-    is_trusted: bool,
-    is_forced: bool,
-}
-
 impl Bench {
-    fn of(family: &str, words: &[(u16, u16)]) -> Self {
-        let family = shipped(family);
-        let keeper = Keeper::new(&family, words);
-        let (script, record) = (Script::new(), Record::default());
-        Self { script, record, family, keeper, is_trusted: false, is_forced: false }
-    }
-
     /// A GD350 at rest, with these words besides.
     fn gd350(words: &[(u16, u16)]) -> Self {
         Self::of("gd350", &[&[(CODE, 0x01A0), (STATE, 3)], words].concat())
     }
 
     fn set(&mut self, setpoint: Setpoint, given: &'static Given) -> Result<(), NotSetBits<Fault>> {
-        let unit = call(&self.family, &self.record, self.is_trusted);
-        let is_forced = self.is_forced;
+        self.set_so(setpoint, given, false)
+    }
+
+    fn set_so(&mut self, setpoint: Setpoint, given: &'static Given, is_forced: bool) -> Result<(), NotSetBits<Fault>> {
+        let unit = self.call();
         let work = |line| async move { unit.set_bits(&line, Families::shipped(), setpoint, given, is_forced).await };
         self.script.carry_out_with(&mut self.keeper, work)
     }
@@ -82,7 +65,7 @@ fn outputs_start_nothing_and_can_be_read_back() {
 /// VFD500: 700AH can only be written.
 #[test]
 fn where_nothing_can_be_read_what_is_not_named_is_off() {
-    let mut bench = Bench { is_trusted: true, ..Bench::of("vfd500", &[(0x700A, 0xFFFF)]) };
+    let mut bench = Bench::of("vfd500", &[(0x700A, 0xFFFF)]).trusting();
     let field = bench.family.profile().find("virtual_output").unwrap().bits()[1].clone();
     let given: &'static Given = Box::leak(Box::new([("DO2", FieldInput::Switch(true))]));
     bench.set(Setpoint::VirtualOutputs, given).unwrap();
@@ -150,8 +133,7 @@ fn over_a_bad_link_nothing_starts_unless_it_is_forced() {
     let why = bench.inputs(S1).unwrap_err();
     assert!(matches!(why, NotSetBits::NotReady(NotReady::BadLink { lost: 0, looks: 10, .. })), "{why}");
     assert_eq!(bench.script.sent, []);
-    bench.is_forced = true;
-    bench.inputs(S1).unwrap();
+    bench.set_so(Setpoint::VirtualInputs, S1, true).unwrap();
     assert_eq!(bench.script.sent.len(), 1);
 }
 

@@ -6,7 +6,7 @@ use super::*;
 use crate::family::Family;
 use crate::record::Record;
 use crate::same_unit::NotSame;
-use crate::scripted::{Fault, Keeper, Script, call, fails, refuses, shipped};
+use crate::scripted::{Bench, Fault, Script, call, fails, refuses, shipped};
 use crate::settled::NotSettled;
 use crate::task::{Cause, Notice};
 use crate::writing::NotWritten;
@@ -19,30 +19,11 @@ const GD350: [(u16, u16); 2] = [(0x2103, 0x01A0), (0x2100, 3)];
 /// And a Goodrive200A.
 const GD200A: [(u16, u16); 2] = [(0x2103, 0x0107), (0x2100, 3)];
 
-/// A unit that is written to, over and over.
-struct Bench {
-    script: Script,
-    record: Record,
-    family: Arc<Family>,
-    keeper: Keeper,
-    is_trusted: bool,
-}
-
 type Wanted = [(&'static str, Input<'static>)];
 
 impl Bench {
-    fn of(family: &str, said: &[(u16, u16)], words: &[(u16, u16)]) -> Self {
-        let family = shipped(family);
-        let keeper = Keeper::new(&family, &[said, words].concat());
-        Self { script: Script::new(), record: Record::default(), family, keeper, is_trusted: false }
-    }
-
-    fn trusting(self) -> Self {
-        Self { is_trusted: true, ..self }
-    }
-
     fn write(&mut self, wanted: &'static Wanted, store: Store) -> Result<(), NotKept<Fault>> {
-        let unit = call(&self.family, &self.record, self.is_trusted);
+        let unit = self.call();
         self.write_by(unit, wanted, store)
     }
 
@@ -70,7 +51,7 @@ impl Bench {
 /// GD350 operation manual, section 9.4.5: bit 15 of the address writes to RAM alone, 000BH is P00.11, which counts tenths.
 #[test]
 fn an_invt_keeps_in_eeprom_what_goes_to_its_plain_address() {
-    let mut bench = Bench::of("gd350", &GD350, &[]);
+    let mut bench = Bench::of("gd350", &GD350);
     bench.write(&[("P00.11", Input::Float(5.0))], Store::Ram).unwrap();
     assert_eq!(bench.script.written(), [(0x800B, vec![50])]);
     // Bit 15 writes, and cannot be read.
@@ -87,7 +68,7 @@ fn an_invt_keeps_in_eeprom_what_goes_to_its_plain_address() {
 #[test]
 fn a_vfd500_keeps_in_eeprom_what_has_bit_15() {
     for (store, place) in [(Store::Ram, 0x0007), (Store::Eeprom, 0x8007)] {
-        let mut bench = Bench::of("vfd500", &[], &[]).trusting();
+        let mut bench = Bench::of("vfd500", &[]).trusting();
         bench.write(&[("P00.07", Input::Text("40.00"))], store).unwrap();
         assert_eq!(bench.script.written(), [(place, vec![0x0FA0])]);
         assert_eq!(bench.script.sent[0].1.read_back, Some(0x0007));
@@ -97,7 +78,7 @@ fn a_vfd500_keeps_in_eeprom_what_has_bit_15() {
 /// GD350 operation manual, section 9.4.8: P00.11 and P00.12 by one 10H.
 #[test]
 fn successive_parameters_share_a_request_where_that_is_printed() {
-    let mut bench = Bench::of("gd350", &GD350, &[]);
+    let mut bench = Bench::of("gd350", &GD350);
     bench.write(&[("P00.11", Input::Float(5.0)), ("P00.12", Input::Float(7.0))], Store::Ram).unwrap();
     assert_eq!(bench.script.written(), [(0x800B, vec![50, 70])]);
     bench.script.sent.clear();
@@ -108,7 +89,7 @@ fn successive_parameters_share_a_request_where_that_is_printed() {
 /// No GD20 page at hand prints that one 10H may write several parameters.
 #[test]
 fn where_nothing_is_printed_of_it_each_goes_by_its_own() {
-    let mut bench = Bench::of("gd20", &[], &[]).trusting();
+    let mut bench = Bench::of("gd20", &[]).trusting();
     assert!(bench.family.profile().requests().joined.is_none());
     bench.write(&[("P00.11", Input::Float(5.0)), ("P00.12", Input::Float(7.0))], Store::Ram).unwrap();
     assert_eq!(bench.script.written(), [(0x800B, vec![50]), (0x800C, vec![70])]);
@@ -117,7 +98,7 @@ fn where_nothing_is_printed_of_it_each_goes_by_its_own() {
 /// What sets the line or says who commands is written alone, and so is what a drive takes only at rest: GD200A manual, p. 92.
 #[test]
 fn what_decides_more_than_itself_shares_no_request() {
-    let mut bench = Bench::of("gd200a", &GD200A, &[(3, 5000), (4, 5000), (5, 0)]);
+    let mut bench = Bench::of("gd200a", &[&GD200A, &[(3, 5000), (4, 5000), (5, 0)][..]].concat());
     bench.write(&[("P14.03", Input::Integer(6)), ("P14.04", Input::Float(1.0))], Store::Ram).unwrap();
     bench.write(&[("P00.01", Input::Integer(2)), ("P00.02", Input::Integer(0))], Store::Ram).unwrap();
     bench.write(&[("P00.04", Input::Float(50.0)), ("P00.05", Input::Float(1.0))], Store::Ram).unwrap();
@@ -127,7 +108,7 @@ fn what_decides_more_than_itself_shares_no_request() {
 
 #[test]
 fn what_eeprom_has_is_not_written_again() {
-    let mut bench = Bench::of("gd350", &GD350, &[(0x000B, 50), (0x000C, 40)]);
+    let mut bench = Bench::of("gd350", &[&GD350, &[(0x000B, 50), (0x000C, 40)][..]].concat());
     let both = &[("P00.11", Input::Float(5.0)), ("P00.12", Input::Float(5.0))];
     bench.write(both, Store::Eeprom).unwrap();
     assert_eq!(bench.script.written(), [(0x000C, vec![50])]);
@@ -140,7 +121,7 @@ fn what_eeprom_has_is_not_written_again() {
 /// What is read is what is in force. Out of RAM it says nothing of EEPROM, neither before the write nor behind it.
 #[test]
 fn what_was_written_to_ram_is_stored_although_it_is_in_force() {
-    let mut bench = Bench::of("gd350", &GD350, &[]);
+    let mut bench = Bench::of("gd350", &GD350);
     let wanted = &[("P00.11", Input::Float(5.0))];
     bench.write(wanted, Store::Ram).unwrap();
     bench.write(wanted, Store::Eeprom).unwrap();
@@ -153,7 +134,7 @@ fn what_was_written_to_ram_is_stored_although_it_is_in_force() {
 
 #[test]
 fn a_write_to_ram_whose_answer_is_lost_may_have_been_taken() {
-    let mut bench = Bench::of("gd350", &GD350, &[(0x000B, 50)]);
+    let mut bench = Bench::of("gd350", &[&GD350, &[(0x000B, 50)][..]].concat());
     bench.keeper.confirms = [fails(Cause::NoAnswer)].into();
     let error = bench.write(&[("P00.11", Input::Float(5.0))], Store::Ram).unwrap_err();
     assert!(error.why.was_sent());
@@ -163,7 +144,7 @@ fn a_write_to_ram_whose_answer_is_lost_may_have_been_taken() {
 
 #[test]
 fn a_program_that_stores_in_a_loop_is_told() {
-    let mut bench = Bench::of("gd350", &GD350, &[]);
+    let mut bench = Bench::of("gd350", &GD350);
     for round in 1..=6 {
         bench.keeper.words.insert(Place::from(0x000B), 0);
         bench.write(&[("acceleration_time_1", Input::Float(5.0))], Store::Eeprom).unwrap();
@@ -175,7 +156,7 @@ fn a_program_that_stores_in_a_loop_is_told() {
 /// P00.03 of a GD350 can be changed only at rest.
 #[test]
 fn what_can_be_written_only_at_rest_waits_for_it() {
-    let mut bench = Bench::of("gd350", &GD350, &[(0x2100, 1)]);
+    let mut bench = Bench::of("gd350", &[&GD350, &[(0x2100, 1)][..]].concat());
     let wanted = &[("P00.11", Input::Float(5.0)), ("P00.03", Input::Float(60.0))];
     let why = bench.why(wanted, Store::Ram);
     assert!(matches!(why, Why::Running { ref names, state: State::Forward } if *names == ["P00.03"]), "{why}");
@@ -188,7 +169,7 @@ fn what_can_be_written_only_at_rest_waits_for_it() {
 
 #[test]
 fn what_the_profile_does_not_allow_is_not_asked_for() {
-    let mut gd350 = Bench::of("gd350", &GD350, &[]);
+    let mut gd350 = Bench::of("gd350", &GD350);
     let mut why = |name, value, store| {
         let wanted: &'static Wanted = Box::leak(Box::new([(name, value)]));
         gd350.not_planned(wanted, store)
@@ -212,18 +193,18 @@ fn what_the_profile_does_not_allow_is_not_asked_for() {
     let register = why("pid_reference", Input::Float(1.0), Store::Eeprom);
     assert!(matches!(register, WhyNotPlanned::NoPlace(AccessError::NotStored { .. })));
     // The manual of the GD10 is not at hand, nor how it keeps its parameters.
-    let mut gd10 = Bench::of("gd10", &[], &[]);
+    let mut gd10 = Bench::of("gd10", &[]);
     let unverified = gd10.not_planned(&[("P00.01", Input::Integer(2))], Store::Ram);
     assert!(matches!(unverified, WhyNotPlanned::MayNot(_) | WhyNotPlanned::MayNotKeep(_)), "{unverified}");
     // Altivar 312: each write counts as kept.
-    let mut atv312 = Bench::of("atv312", &[], &[]);
+    let mut atv312 = Bench::of("atv312", &[]);
     assert_eq!(atv312.not_planned(&[("ttO", Input::Float(1.0))], Store::Ram), WhyNotPlanned::OnlyStored);
 }
 
 /// One that is not allowed keeps all others back, in whatever order they stand.
 #[test]
 fn nothing_is_sent_where_one_of_several_is_not_allowed() {
-    let mut bench = Bench::of("gd350", &GD350, &[]);
+    let mut bench = Bench::of("gd350", &GD350);
     bench.not_planned(&[("P00.11", Input::Float(5.0)), ("output_current", Input::Float(5.0))], Store::Ram);
     assert_eq!(bench.script.asked, []);
     bench.not_planned(&[("output_current", Input::Float(5.0)), ("P00.11", Input::Float(5.0))], Store::Ram);
@@ -232,7 +213,7 @@ fn nothing_is_sent_where_one_of_several_is_not_allowed() {
 /// Of parameters that shared a request, nobody knows which were taken before the drive refused it.
 #[test]
 fn a_shared_request_that_is_refused_says_what_is_in_force() {
-    let mut bench = Bench::of("gd350", &GD350, &[(0x000B, 50), (0x000C, 40)]);
+    let mut bench = Bench::of("gd350", &[&GD350, &[(0x000B, 50), (0x000C, 40)][..]].concat());
     bench.keeper.confirms = [Ok(()), refuses(0x03)].into();
     let wanted = &[("pid_reference", Input::Float(1.0)), ("P00.11", Input::Float(9.0)), ("P00.12", Input::Float(9.0))];
     let NotKept { done, parts, why, .. } = bench.write(wanted, Store::Ram).unwrap_err();
@@ -251,7 +232,7 @@ fn a_shared_request_that_is_refused_says_what_is_in_force() {
 /// GD350: P00.15 tunes the motor. A drive that says that it is busy may have begun.
 #[test]
 fn what_acts_when_it_is_written_is_sent_once() {
-    let mut bench = Bench::of("gd350", &GD350, &[]).trusting();
+    let mut bench = Bench::of("gd350", &GD350).trusting();
     bench.keeper.confirms = [refuses(0x06)].into();
     bench.write(&[("P00.15", Input::Integer(2))], Store::Ram).unwrap_err();
     assert_eq!(bench.script.written(), [(0x800F, vec![2])]);
@@ -261,7 +242,7 @@ fn what_acts_when_it_is_written_is_sent_once() {
 /// 06H: busy, by the specification.
 #[test]
 fn what_a_busy_drive_did_not_take_is_sent_no_more_than_five_times() {
-    let mut bench = Bench::of("gd350", &GD350, &[]);
+    let mut bench = Bench::of("gd350", &GD350);
     let wanted = &[("P00.11", Input::Float(5.0))];
     bench.write(wanted, Store::Ram).unwrap();
     bench.script.sent.clear();
@@ -276,7 +257,7 @@ fn what_a_busy_drive_did_not_take_is_sent_no_more_than_five_times() {
 /// 0180H: IMO SD1, and no Goodrive350.
 #[test]
 fn a_unit_that_contradicts_its_name_gets_nothing() {
-    let mut bench = Bench::of("gd350", &[(0x2103, 0x0107), (0x2100, 3)], &[]);
+    let mut bench = Bench::of("gd350", &[(0x2103, 0x0107), (0x2100, 3)]);
     let why = bench.why(&[("P00.11", Input::Float(5.0))], Store::Ram);
     assert_eq!(bench.script.sent, []);
     let Why::NotWritten { why, .. } = why else { panic!("{why}") };
@@ -286,7 +267,7 @@ fn a_unit_that_contradicts_its_name_gets_nothing() {
 /// VFD500: P30.14 says in what the registers of the bus count the frequency. It is no part of a call that counts in that.
 #[test]
 fn what_decides_is_written_by_itself() {
-    let mut bench = Bench::of("vfd500", &[], &[]).trusting();
+    let mut bench = Bench::of("vfd500", &[]).trusting();
     let why = bench.why(&[("speed_reference", Input::Float(1.0)), ("P30.14", Input::Integer(1))], Store::Ram);
     let Why::Decides { name, other } = why else { panic!("{why}") };
     assert_eq!((name.as_str(), other.as_str()), ("P30.14", "speed_reference"));
@@ -299,7 +280,7 @@ fn what_decides_is_written_by_itself() {
 /// A drive that was said to count in one unit is not made one that counts in another.
 #[test]
 fn what_was_said_of_a_drive_stands() {
-    let mut bench = Bench::of("vfd500", &[], &[]).trusting();
+    let mut bench = Bench::of("vfd500", &[]).trusting();
     let choices = bench.family.profile().variants()["speed_unit"].choices.clone();
     let profile = bench.family.profile().with_variants([("speed_unit", "Hz")]).unwrap();
     let unit = call(&bench.family, &bench.record, true).with_profile(&Arc::new(profile));
@@ -321,7 +302,7 @@ fn what_was_said_of_a_drive_stands() {
 #[test]
 fn a_value_is_counted_as_the_drive_is_set() {
     let choices = shipped("vfd500").profile().variants()["speed_unit"].choices.clone();
-    let mut bench = Bench::of("vfd500", &[], &[(0x1E0E, choices["Hz"].word)]).trusting();
+    let mut bench = Bench::of("vfd500", &[(0x1E0E, choices["Hz"].word)]).trusting();
     bench.write(&[("speed_reference", Input::Float(12.34))], Store::Ram).unwrap();
     assert_eq!(bench.script.written().pop().unwrap().1, [1234]);
     bench.script.sent.clear();

@@ -1,40 +1,20 @@
-use std::sync::Arc;
-
 use drivebus_drives::Place;
 
 use super::*;
-use crate::family::Family;
 use crate::parameters::WhyNotKept;
-use crate::record::Record;
-use crate::scripted::{Fault, Keeper, Script, call, refuses, shipped};
+use crate::scripted::{Bench, Fault, Keeper, call, refuses, shipped};
 use crate::writing::NotWritten;
 
-/// A unit that is prepared, over and over.
-struct Bench {
-    script: Script,
-    record: Record,
-    family: Arc<Family>,
-    keeper: Keeper,
-    is_trusted: bool,
-}
-
 impl Bench {
-    fn of(family: &str, words: &[(u16, u16)]) -> Self {
-        let family = shipped(family);
-        let keeper = Keeper::new(&family, words);
-        Self { script: Script::new(), record: Record::default(), family, keeper, is_trusted: false }
-    }
-
     /// A GD350 at rest, whose P00.01, P00.02 and P00.06 are these.
-    fn gd350(set: [u16; 3]) -> Self {
+    fn gd350_set(set: [u16; 3]) -> Self {
         let [commands, bus, frequency] = set;
-        let bench = Self::of("gd350", &[(0x2103, 0x01A0), (0x2100, 3), (1, commands), (2, bus), (6, frequency)]);
         // That 0 of P00.02 is Modbus is printed for sister series alone.
-        Self { is_trusted: true, ..bench }
+        Self::of("gd350", &[(0x2103, 0x01A0), (0x2100, 3), (1, commands), (2, bus), (6, frequency)]).trusting()
     }
 
     fn prepare(&mut self, setpoint: Setpoint, store: Store) -> Result<Vec<Setting>, NotPrepared<Fault>> {
-        let unit = call(&self.family, &self.record, self.is_trusted);
+        let unit = self.call();
         let work = |line| async move { unit.prepare(&line, Families::shipped(), setpoint, store).await };
         self.script.carry_out_with(&mut self.keeper, work)
     }
@@ -43,7 +23,7 @@ impl Bench {
 /// GD350 operation manual, section 9.4.5: P00.01 = 2, P00.06 = 8; the setpoint first, and who commands last.
 #[test]
 fn only_what_is_set_otherwise_is_written() {
-    let mut bench = Bench::gd350([0, 0, 0]);
+    let mut bench = Bench::gd350_set([0, 0, 0]);
     let settings = bench.prepare(Setpoint::Frequency, Store::Ram).unwrap();
     assert!(settings.iter().all(Setting::is_right));
     let order: Vec<_> = settings.iter().map(|setting| setting.wanted.code.as_str()).collect();
@@ -61,7 +41,7 @@ fn only_what_is_set_otherwise_is_written() {
 /// What this record set in RAM is kept as well, although it is right.
 #[test]
 fn what_was_prepared_in_ram_is_stored_when_that_is_said() {
-    let mut bench = Bench::gd350([0, 0, 8]);
+    let mut bench = Bench::gd350_set([0, 0, 8]);
     bench.prepare(Setpoint::Frequency, Store::Ram).unwrap();
     bench.script.sent.clear();
     bench.prepare(Setpoint::Frequency, Store::Eeprom).unwrap();
@@ -74,7 +54,7 @@ fn what_was_prepared_in_ram_is_stored_when_that_is_said() {
 /// The GD350 text names the Modbus choice of P09.00 without its number.
 #[test]
 fn a_value_that_is_not_printed_is_not_written() {
-    let mut bench = Bench { is_trusted: false, ..Bench::gd350([2, 0, 8]) };
+    let mut bench = Bench { is_trusted: false, ..Bench::gd350_set([2, 0, 8]) };
     let why = bench.prepare(Setpoint::Pid, Store::Ram).unwrap_err();
     assert!(matches!(&why, NotPrepared::MayNot { setting, .. } if setting.wanted.code == "P09.00"), "{why}");
     assert_eq!(bench.script.sent, []);
@@ -83,7 +63,7 @@ fn a_value_that_is_not_printed_is_not_written() {
     bench.prepare(Setpoint::Pid, Store::Ram).unwrap();
     assert_eq!(bench.script.sent, []);
     // And who trusts it writes it.
-    let mut trusting = Bench::gd350([2, 0, 8]);
+    let mut trusting = Bench::gd350_set([2, 0, 8]);
     trusting.prepare(Setpoint::Pid, Store::Ram).unwrap();
     assert_eq!(trusting.script.written(), [(0x8900, vec![6])]);
 }
@@ -109,7 +89,7 @@ fn what_is_set_by_hand_is_left_to_who_writes_it() {
 
 #[test]
 fn a_drive_that_keeps_what_it_had_is_told_of() {
-    let mut refusing = Bench::gd350([0, 0, 0]);
+    let mut refusing = Bench::gd350_set([0, 0, 0]);
     refusing.keeper.confirms = [Ok(()), refuses(0x03)].into();
     let NotPrepared::NotKept(not_kept) = refusing.prepare(Setpoint::Frequency, Store::Ram).unwrap_err() else {
         panic!("it was prepared")
@@ -133,7 +113,7 @@ fn what_is_shown_afterwards_counts() {
         }
     }
 
-    let Bench { mut script, record, family, keeper, .. } = Bench::gd350([0, 0, 8]);
+    let Bench { mut script, record, family, keeper, .. } = Bench::gd350_set([0, 0, 8]);
     let unit = call(&family, &record, true);
     let work = |line| async move { unit.prepare(&line, Families::shipped(), Setpoint::Frequency, Store::Ram).await };
     let why = script.carry_out(Stubborn(keeper), work).unwrap_err();

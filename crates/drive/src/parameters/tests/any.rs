@@ -212,7 +212,7 @@ fn whatever_contradicts_its_name_gets_nothing() {
             if family.contradiction(&[Answer::word_at(place, code)]).is_none() {
                 continue;
             }
-            let mut bench = Bench::of(family.name(), &[(place.address, code)], &[]);
+            let mut bench = Bench::of(family.name(), &[(place.address, code)]);
             let done = bench.write(wanted, Store::Ram);
             assert_eq!(bench.script.sent, [], "{} says {code:04X}H", family.name());
             let is_told = matches!(*done.unwrap_err().why, Why::NotWritten { why: NotWritten::NotSame(_), .. });
