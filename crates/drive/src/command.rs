@@ -13,9 +13,7 @@ use drivebus_drives::{Command, Place, State};
 
 pub use not_commanded::{NotCommanded, NotLedUp, WhyNotCommanded, WhyNotLedUp};
 
-use crate::aim::check_harmless;
 use crate::families::Families;
-use crate::harm::What;
 use crate::look::Look;
 use crate::ready::NotReady;
 use crate::task::{LineError, Mailbox, Notice, Payload, WRITE_MANY};
@@ -257,8 +255,6 @@ impl Unit {
         if !before.is_tripped() && !is_untold {
             return Ok(false);
         }
-        let harmless = check_harmless(line, families, unit.same(), What::Command(command)).await;
-        harmless.map_err(|why| Why::NotWritten(NotWritten::Harm(why)))?;
         unit.give(line, families, command, (place, Payload::Word(code))).await?;
         Ok(true)
     }

@@ -1,6 +1,6 @@
 //! One write to a unit: only if it still is what it was, and only where the words do no harm to what it may be instead.
 
-use drivebus_drives::Place;
+use drivebus_drives::{Command, Place};
 use drivebus_rtu::Meaning;
 use thiserror::Error;
 
@@ -27,7 +27,7 @@ pub struct Words {
     /// Whether it is a value and no command: where the drive says that it is busy or got the request damaged, so that it did
     /// not take it, it is sent again.
     pub is_absolute: bool,
-    /// Whether a unit that contradicts its name gets nothing.
+    /// Whether a unit that contradicts its name gets nothing. Where not, it is a reset, which must do no harm to what that is.
     pub is_judged: bool,
     /// Whether it goes out also where the line knows the unit as one of a family that does not define it.
     pub is_forced: bool,
@@ -107,20 +107,26 @@ impl Unit {
         }
     }
 
-    /// The connection over which the unit is what it was, and, where that is judged, takes no harm.
+    /// The connection over which the unit is what it was, and takes no harm.
     async fn make_sure<E: LineError>(
         &self,
         line: &Mailbox<E>,
         families: &Families,
         words: &Words,
     ) -> Result<u64, NotWritten<E>> {
+        let opened = line.connection();
+        let harms_not = async |what| check_harmless(line, families, self.same(), what).await.map_err(NotWritten::Harm);
+        // What is not judged resets a fault.
+        if !words.is_judged {
+            harms_not(What::Command(Command::ResetFault)).await?;
+        }
         let checked = self.same().check(line, families, words.is_judged, false).await;
         let connection = checked.map_err(NotWritten::NotSame)?;
         if words.is_judged {
-            let what = What::Word(words.place);
-            check_harmless(line, families, self.same(), what).await.map_err(NotWritten::Harm)?;
+            harms_not(What::Word(words.place)).await?;
         }
-        Ok(connection)
+        // What answered before the port was opened again may be another drive: nothing is sent then.
+        Ok(connection.min(opened))
     }
 
     /// Writes to whatever unit answers over this connection. One that says that it took it and is still at it has taken it.
