@@ -164,12 +164,11 @@ fn a_bus_that_is_closed_tells_nobody_anything() {
 
 /// The port is lost behind each of the first answers, and leads to a drive of another family when it is open again.
 ///
-/// An EDS300 that stands there is left out of it: it refuses each read by which the line could make sure of an answer, and so
-/// counts as one that says nothing.
+/// An EDS300 refuses each read by which the line could make sure of an answer: that is no silence.
 #[test]
 fn what_one_drive_answered_says_nothing_of_another() {
     for here in ["gd350", "ms300", "a1000", "vfd500"] {
-        for there in ["gd350", "ms300", "acs355", "wj200", "v20"] {
+        for there in ["gd350", "eds300", "ms300", "acs355", "wj200", "v20"] {
             for answer in 1..=8 {
                 let (one, other) = (Plant::running(here), Plant::of(there));
                 let bus = lost_at(answer, &one.simulator, &other.simulator);

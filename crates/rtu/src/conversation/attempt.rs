@@ -142,11 +142,12 @@ impl<'r> Conversation<'r> {
     /// What is said where nothing that was tried made sure of the unit.
     fn none_settled(&mut self, now: Instant) -> Slip {
         match self.attempt.tried.failure.take() {
-            Some((slip, came)) if !slip.why.is_refused() => {
+            Some((slip, came)) => {
                 self.came = came;
-                slip
+                // A refusal says that the unit is there, and not what it may owe.
+                if slip.why.is_refused() { Slip { why: Unanswered::Doubtful, sent: None, ended: now } } else { slip }
             }
-            _ => self.slip(Unanswered::Doubtful, None, now),
+            None => self.slip(Unanswered::Doubtful, None, now),
         }
     }
 

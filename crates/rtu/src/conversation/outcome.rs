@@ -39,7 +39,8 @@ pub enum Unanswered {
         /// How long until it is asked again.
         left: Duration,
     },
-    /// The unit may still answer an earlier request, and nothing that was tried settled it. Nothing was sent.
+    /// The unit may still answer an earlier request, and nothing that was tried settled it. Nothing was sent. Where the unit
+    /// refused what was tried, that is what came.
     Doubtful,
     /// The line was never silent long enough to send. Nothing was sent.
     Busy {

@@ -27,11 +27,12 @@ fn an_answer_beside_what_may_be_left_of_an_echo_shows_nothing() {
     let mut rig = unknown();
     // The end of the request that looks.
     let left = &read(0, 1)[5..];
-    for answer in [words(&[5]), sealed(&[UNIT.get(), 0x83, 2])] {
+    let refusal = sealed(&[UNIT.get(), 0x83, 2]);
+    for (answer, came) in [(words(&[5]), &[][..]), (refusal.clone(), &refusal)] {
         rig.then = Says([left, &answer].concat());
         let told = rig.run(set(9, 1));
         assert_eq!((told.end, told.sent), (End::Failed(Unanswered::Doubtful), vec![read(0, 1); 7]));
-        assert_eq!((told.last_sent, told.raw.len(), rig.known.echo()), (None, 0, OwnEcho::Unknown));
+        assert_eq!((told.last_sent, &told.raw[..], rig.known.echo()), (None, came, OwnEcho::Unknown));
         assert_eq!(told.counts.retries, 2, "an attempt ends with the third");
     }
 }
