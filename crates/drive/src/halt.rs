@@ -80,7 +80,7 @@ pub struct Halt<E> {
     is_taken: bool,
     /// Whether it confirmed that; a unit may also say that it is still at it, and show nothing.
     is_confirmed: bool,
-    /// Whether any frame went out.
+    /// Whether any frame went out that was not refused.
     was_sent: bool,
     heard: Option<Instant>,
     failure: Option<E>,
@@ -118,7 +118,7 @@ impl<E: LineError> Halt<E> {
     ///
     /// # Errors
     ///
-    /// [`NotHalted`]: the motor may still turn. Its `was_sent` says whether a halt went out.
+    /// [`NotHalted`]: the motor may still turn. Its `was_sent` says whether the drive may have taken a halt.
     pub async fn carry_out(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), NotHalted<E>> {
         match self.until_proved(line, families).await {
             Ok(()) => Ok(()),
@@ -325,7 +325,7 @@ impl<E: LineError> Halt<E> {
                 self.was_sent = true;
                 continue;
             };
-            self.was_sent |= error.was_sent();
+            self.was_sent |= error.was_sent() && !error.cause().is_refusal();
             match error.cause() {
                 // Who says that it took it got it, whatever else is known of the request.
                 Cause::Refused(code, _) if family.meaning_of(code) == Meaning::Taken => {

@@ -15,8 +15,7 @@ impl From<NotHalted<Self>> for Error {
             Why::Refused { .. } => ErrorKind::Refused,
             _ => ErrorKind::Unconfirmed,
         };
-        let was_refused = matches!(kind, ErrorKind::Refused);
-        Self::of(kind, &error).having_acted(error.was_sent && !was_refused)
+        Self::of(kind, &error).having_acted(error.was_sent)
     }
 }
 

@@ -24,7 +24,8 @@ pub struct NotHalted<E> {
     pub family: Arc<Family>,
     /// What was sent last, or was to be sent.
     pub command: Command,
-    /// Whether any halt went out, so that the drive may have taken it. Where none did, the drive goes on as it was.
+    /// Whether any halt went out that was not refused, so that the drive may have taken it. Where none did, it goes on as it
+    /// was.
     pub was_sent: bool,
     /// The line's clock when that was found.
     pub found: Instant,
