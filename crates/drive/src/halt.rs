@@ -75,6 +75,8 @@ pub struct Halt<E> {
     until: Instant,
     /// The moment before the frame that was taken.
     sent: Instant,
+    /// How often the port had been opened again when it went out.
+    connection: u64,
     /// When it was.
     confirmed: Instant,
     is_taken: bool,
@@ -93,6 +95,7 @@ impl<E: LineError> Halt<E> {
     /// A halt of `unit` as `order` says. Nothing is sent yet.
     pub fn new(unit: Taken, record: &Record, order: Order, families: &Families, now: Instant) -> Self {
         Self {
+            connection: unit.same().identity().connection(),
             aim: Aim::new(unit.same().clone(), families, now),
             named: unit.clone(),
             unit,
@@ -306,7 +309,7 @@ impl<E: LineError> Halt<E> {
         let line = &line.taken_for(family);
         self.record.note(|sent| sent.halts_begun += 1);
         self.told.push(self.command);
-        self.sent = line.now();
+        (self.sent, self.connection) = (line.now(), line.connection());
         self.is_confirmed = true;
         let profile = family.profile();
         for (place, word) in [profile.command_first(self.command), profile.command(self.command)].into_iter().flatten()
@@ -318,7 +321,7 @@ impl<E: LineError> Halt<E> {
                 is_forced: !self.is_as_named(),
                 timeout: Some(ANSWER_WITHIN),
                 // Behind a port that was opened again another drive may be, which has to say what it is.
-                connection: Some(line.connection()),
+                connection: Some(self.connection),
                 ..Write::new(self.unit.same().unit(), place, payload)
             };
             let Err(error) = line.write(write).await else {

@@ -71,6 +71,11 @@ pub(crate) trait Unit {
 
     /// What becomes of a write.
     fn write(&mut self, write: &Write, now: Instant) -> Result<(), Fault>;
+
+    /// How often the port was opened again to come to it.
+    fn reopened(&self) -> u64 {
+        0
+    }
 }
 
 impl<F: FnMut(Read) -> Reply> Unit for F {
@@ -277,7 +282,8 @@ impl Script {
         let mut task = Task::new(operation);
         let mut outcome = None;
         loop {
-            let seen = Seen { now: self.now, connection: self.connection, is_closed: self.is_closed };
+            let connection = self.connection + unit.reopened();
+            let seen = Seen { now: self.now, connection, is_closed: self.is_closed };
             outcome = match task.step(seen, outcome).unwrap() {
                 Step::Done(done) => return done,
                 Step::Wish(Wish::Read(read)) => {

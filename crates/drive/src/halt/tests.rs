@@ -258,6 +258,44 @@ fn a_fall_along_its_ramp_proves_a_stop_and_no_other_one_does() {
     }
 }
 
+/// An MS300 that takes its stop; when its state is asked for, the port was opened again and leads to `there`.
+struct Exchanged {
+    here: Arc<Family>,
+    there: Motor,
+    is_told: bool,
+    is_there: bool,
+}
+
+impl Unit for Exchanged {
+    fn read(&mut self, read: Read, now: Instant) -> Reply {
+        let state = self.here.profile().role("state").and_then(Entry::place);
+        self.is_there |= self.is_told && Some(read.place) == state;
+        if self.is_there { self.there.read(read, now) } else { like(&self.here, &[])(read) }
+    }
+
+    fn write(&mut self, write: &Write, now: Instant) -> Result<(), Fault> {
+        if write.connection != Some(self.reopened()) {
+            return Err(Fault { cause: Cause::Port, raw: Vec::new(), was_sent: false });
+        }
+        self.is_told = true;
+        if self.is_there { self.there.write(write, now) } else { Ok(()) }
+    }
+
+    fn reopened(&self) -> u64 {
+        self.is_there.into()
+    }
+}
+
+/// 2101H is the state of an MS300; a GD350 that runs has 0 there, by which an MS300 stands.
+#[test]
+fn what_shows_a_halt_behind_a_port_that_was_opened_again_says_what_it_is() {
+    let here = shipped("ms300");
+    let unit = Exchanged { here: Arc::clone(&here), there: Motor::new(1000.0), is_told: false, is_there: false };
+    let halted = halt(&here, order(Command::Stop), unit);
+    assert!(halted.done.is_ok(), "{:?}", halted.done);
+    assert_eq!(halted.words().last(), Some(&5), "it stops as a GD350");
+}
+
 /// What turns the other way than it was started may be on its way through zero.
 #[test]
 fn a_fall_of_what_was_started_otherwise_proves_nothing() {

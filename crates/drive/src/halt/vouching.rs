@@ -94,9 +94,16 @@ impl<E: LineError> Halt<E> {
 
     /// Whether it was halted once more, as another family, although it showed the halt: in the words of that one.
     ///
-    /// Asks nothing of a unit that said lately what it is, nor where the halt does no harm to any family.
+    /// Asks nothing of a unit that said lately what it is, nor where the halt does no harm to any family. Behind a port that
+    /// was opened again since, what showed the halt may be a drive that never got it: that has to say what it is.
     pub(super) async fn was_another(&mut self, line: &Mailbox<E>, families: &Families) -> Result<bool, Why<E>> {
         let same = self.unit.same();
+        if line.connection() != self.connection {
+            return match self.contradiction(line, families).await? {
+                None => Ok(false),
+                Some(_) => self.vouch_anew(line, families).await,
+            };
+        }
         let is_harmless = || families.harmed(What::Command(self.command), same.family()).is_empty();
         if !same.identity().is_old(line.now()) || is_harmless() {
             return Ok(false);

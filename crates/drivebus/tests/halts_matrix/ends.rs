@@ -169,10 +169,14 @@ fn a_bus_that_is_closed_tells_nobody_anything() {
 fn what_one_drive_answered_says_nothing_of_another() {
     for here in ["gd350", "ms300", "a1000", "vfd500"] {
         for there in ["gd350", "eds300", "ms300", "acs355", "wj200", "v20"] {
-            for answer in 1..=8 {
-                let (one, other) = (Plant::running(here), Plant::of(there));
-                let bus = lost_at(answer, &one.simulator, &other.simulator);
-                halted(&other, &bus, &stop_as(&one)).ok();
+            for motion in [Motion::AtRest, Motion::Forward] {
+                let other = Plant::of(there);
+                for answer in 1..=8 {
+                    let one = Plant::running(here);
+                    other.put(motion);
+                    let bus = lost_at(answer, &one.simulator, &other.simulator);
+                    halted(&other, &bus, &stop_as(&one)).ok();
+                }
             }
         }
     }
