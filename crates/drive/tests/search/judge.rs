@@ -7,7 +7,7 @@ use drivebus_drive::{Families, Family, Identification, NotCommanded, NotHalted};
 use drivebus_drives::{Entry, Place};
 use drivebus_rtu::Instant;
 
-use crate::case::{Call, Case};
+use crate::case::{Call, Case, Stands};
 use crate::drives::{Drive, Took, Turns};
 use crate::models::{Act, Model};
 use crate::world::{Failed, Fault};
@@ -73,8 +73,6 @@ pub(crate) struct Judge {
     /// Whether the unit was asked what it is since the port was opened, and whether it said anything.
     is_asked: bool,
     is_heard: bool,
-    /// Whether another drive has come meanwhile.
-    is_swapped: bool,
     /// What the motor did when its state was looked at last.
     state: Option<Turns>,
     /// The same when anything was read last that shows it, how it was told to run, and which drive that was.
@@ -103,7 +101,6 @@ impl Judge {
             is_link_good: false,
             is_asked: false,
             is_heard: false,
-            is_swapped: false,
             state: None,
             seen: None,
             fault: None,
@@ -126,7 +123,6 @@ impl Judge {
 
     pub(crate) fn opened(&mut self, by_another: bool) {
         (self.is_asked, self.is_heard) = (false, false);
-        self.is_swapped |= by_another;
         // It is told of the one that is there.
         self.started &= !by_another;
     }
@@ -201,7 +197,7 @@ impl Judge {
         let starts = done.iter().any(|took| matches!(took, Took::Act(Act::Run(_))));
         let is_other = drive.model != named;
         if is_other || call.halts() {
-            let is_excused = call.halts() && (!self.is_heard || self.is_swapped || self.denied);
+            let is_excused = call.halts() && (!self.is_heard || self.denied);
             self.must(!done.iter().any(harms) || is_excused, || {
                 format!("6: {write} starts or sets a {:?}", drive.model)
             });
@@ -242,7 +238,9 @@ impl Judge {
         match done {
             Done::Halted(Ok(())) => {
                 let is_lie = self.denied && drive.model != self.case.named;
-                let is_believed = !tells && self.lied || self.is_swapped || is_lie;
+                // Where it tells no state, that it took the word is all there is.
+                let is_taken = self.lied || matches!(self.case.stands, Stands::AtKeypad(_));
+                let is_believed = !tells && is_taken || is_lie;
                 self.must(drive.is_let_go() || is_believed, || format!("4: halted, it says, and {:?}", drive.runs));
                 let is_told = self.halted || self.lied;
                 self.must(is_told, || "4: halted, it says, and was never told".to_owned());
