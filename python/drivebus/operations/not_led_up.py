@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivebus.advice import Text, call
 from drivebus.errors import LINE_ERRORS, DrivebusError, Unconfirmed
@@ -10,7 +10,9 @@ from drivebus.look import Look
 from drivebus.operations import glances, not_written
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.said import said
-from drivebus.profile.facts import StartStep
+
+if TYPE_CHECKING:
+    from drivebus.profile.facts import StartStep
 
 __all__ = ["in_words"]
 

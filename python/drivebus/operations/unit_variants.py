@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Set
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivebus.advice import Advice, Text
 from drivebus.errors import DrivebusError, NotReady
 from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile.evidence import Evidence, not_verified, refusal_of
-from drivebus.profile.facts import Variant
+
+if TYPE_CHECKING:
+    from drivebus.profile.facts import Variant
 
 __all__ = ["given", "is_open", "not_settled", "rules", "settled", "undecided"]
 
