@@ -41,7 +41,7 @@ def to_first_byte(command: str) -> float:
         tty.setraw(own)
         tty.setraw(far)
         program = Path(sys.executable).with_name("drivebus")
-        called = [program, "--port", os.ttyname(far), "--format", "8N2", "--profile", "gd350", command]
+        called = [str(program), "--port", os.ttyname(far), "--format", "8N2", "--profile", "gd350", command]
         began = time.perf_counter_ns()
         with subprocess.Popen(called, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
             came, _, _ = select.select([own], [], [], LONGEST)

@@ -717,12 +717,12 @@ class Unit:
     and what is told of that again:
 
     `"not_commanded"` has the command or None, the line's clock when that was found, and the kind: `"not_ready"`,
-    `"not_set"` and `"not_written"` as below; `"not_led_up"`, the number of the word of the start sequence, and a kind:
-    `"halted_before"` or `"not_written"` as below, `"halted"`, `"tripped"` and a look as of `Looks.look`, `"port_lost"`
-    and the error, or one of the last look; `"halted"` and the error; `"halted_between"` and the error or None;
-    `"unanswered"`, the error, and a look or the error instead of one; `"refused_and_turns"`, the error and a look;
-    `"port_lost"` and the error; `"unshown"`, the last look and None, or `"unread"` and the error of that;
-    `"ignored"`, settings, and a kind with what is told of it.
+    `"not_set"` and `"not_written"` as below; `"not_led_up"`, the number of the word of the start sequence, and a
+    kind: `"halted_before"` or `"not_written"` as below, `"halted"`, `"tripped"` and a look as of `Looks.look`,
+    `"port_lost"` and the error, or one of the last look; `"halted"` and the error; `"halted_between"` and the error
+    or None; `"half_written"` and a kind as of `"not_written"`; `"unanswered"`, the error, and a look or the error
+    instead of one; `"refused_and_turns"`, the error and a look; `"port_lost"` and the error; `"unshown"`, the last
+    look and None, or `"unread"` and the error of that; `"ignored"`, settings, and a kind with what is told of it.
 
     `"not_ready"`: `"may_not"`, `"unseen"`, `"unstoppable"`; `"bad_link"`, how many of the last exchanges were good and
     how many there were, and how many looks failed of how many; `"settings"`, what it does otherwise (`"words"`,

@@ -65,6 +65,8 @@ pub struct Aim {
 struct Look {
     apart: Apart,
     is_doubted: bool,
+    /// Whether it answered anything over this connection, or may have: also that it is busy.
+    has_spoken: bool,
     heard: Instant,
     /// How often the port had been opened again when it was asked last.
     connection: u64,
@@ -75,7 +77,7 @@ impl Aim {
     pub fn new(same: SameUnit, families: &Families, now: Instant) -> Self {
         let apart = Apart::new(same.family(), families, same.is_trusted());
         let connection = same.identity().connection();
-        Self { same, look: Mutex::new(Look { apart, is_doubted: false, heard: now, connection }) }
+        Self { same, look: Mutex::new(Look { apart, is_doubted: false, has_spoken: false, heard: now, connection }) }
     }
 
     /// The line's clock when the unit last answered what it was asked, or may have; at first when this was made.
@@ -105,6 +107,7 @@ impl Aim {
         self.with(|look| {
             if look.connection != connection {
                 (look.apart, look.connection) = (self.apart(families, look.is_doubted), connection);
+                look.has_spoken = false;
             }
         });
     }
@@ -141,16 +144,16 @@ impl Aim {
                     return Err(NotTaken::NotTold(NotTold::Failed(error)));
                 }
                 Err(error) if may_be_of(unit, error.raw()) => {
-                    self.with(|look| look.heard = line.now());
+                    self.with(|look| (look.has_spoken, look.heard) = (true, line.now()));
                     return Ok(None);
                 }
-                // Silence is no evidence. Where it spoke before, the line lost this one.
-                Err(_) if is_doubted() || self.with(|look| look.apart.is_asked()) => return Ok(None),
+                // Silence is no evidence. Where it spoke before, or against its name, the line lost this one.
+                Err(_) if is_doubted() || self.has_spoken() => return Ok(None),
                 Err(_) => return Ok(named()),
             };
             self.keep_to(line.connection(), families);
             let is_telling = self.with(|look| {
-                look.heard = line.now();
+                (look.has_spoken, look.heard) = (true, line.now());
                 look.apart.heard(answer)
             });
             if !is_telling {
@@ -158,6 +161,11 @@ impl Aim {
             }
         }
         Err(NotTaken::MayBe(Vec::new()))
+    }
+
+    /// Whether it spoke yet, or spoke against its name when it was asked last.
+    fn has_spoken(&self) -> bool {
+        self.same.identity().contradicts() || self.with(|look| look.has_spoken)
     }
 
     /// The unit as one of `family`.

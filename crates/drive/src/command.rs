@@ -207,6 +207,7 @@ impl Unit {
             Err(Why::NotWritten(NotWritten::Failed(last))) if was_running && self.parts() > parts => {
                 return Err(Why::Unanswered { last, after: self.after(line).await? });
             }
+            Err(Why::NotWritten(why)) if was_running && self.parts() > parts => return Err(Why::HalfWritten(why)),
             given => given?,
         }
         self.confirm(line, shown, start.confirm).await

@@ -28,6 +28,7 @@ use crate::record::Record;
 use crate::taken::Taken;
 use crate::task::{Cause, LineError, Mailbox, Notice, Payload, Write};
 use proof::Proof;
+use vouching::Anew;
 
 /// Time between a frame that came to nothing at once, and the next.
 const PAUSE: Duration = Duration::from_millis(40);
@@ -177,7 +178,7 @@ impl<E: LineError> Halt<E> {
                     self.until_taken(line, families).await?;
                 }
                 Err(why) if why.is_unproved() => {
-                    if !self.vouch_anew(line, families).await? {
+                    if self.vouch_anew(line, families).await? != Anew::Another {
                         return Err(why);
                     }
                 }
@@ -200,7 +201,7 @@ impl<E: LineError> Halt<E> {
                 }
                 Ok(true) => {}
                 Err(why) => {
-                    if !why.is_unproved() || !self.vouch_anew(line, families).await? {
+                    if !why.is_unproved() || self.vouch_anew(line, families).await? != Anew::Another {
                         return Err(why);
                     }
                 }

@@ -251,7 +251,7 @@ async fn by_answers<E: LineError>(
         .flat_map(wanted)
         .map(|(place, _)| place)
         .collect();
-    let mut seen: Vec<_> = telling.into_iter().filter_map(|place| Some((place, *asked.get(&place)?))).collect();
+    let mut seen: Vec<_> = telling.into_iter().filter_map(|place| Some((place, asked.get(place)?))).collect();
     seen.sort_unstable_by_key(|&(place, _)| place.number());
     Ok(Identification {
         unit,

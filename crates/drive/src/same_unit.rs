@@ -17,7 +17,7 @@ mod told;
 use std::sync::Arc;
 
 use drivebus_drives::{Entry, Evidence, Place};
-use drivebus_rtu::{Instant, UnitAddress};
+use drivebus_rtu::{Instant, Meaning, UnitAddress};
 
 pub use identity::Identity;
 pub use not_same::NotSame;
@@ -38,6 +38,14 @@ pub struct SameUnit {
     family: Arc<Family>,
     identity: Identity,
     is_trusted: bool,
+}
+
+/// What a unit says against its family.
+#[derive(Debug)]
+pub(crate) struct Against {
+    pub(crate) found: Option<Contradiction>,
+    /// Whether each question brought something that counts: no silence, and not that it is busy.
+    pub(crate) is_whole: bool,
 }
 
 impl SameUnit {
@@ -121,7 +129,8 @@ impl SameUnit {
             if !self.is_trusted {
                 against = self.family.contradiction(&answers);
                 if against.is_none() && failure.is_none() {
-                    against = self.other(line, families, &answers, is_urgent).await.map_err(NotSame::Failed)?;
+                    let other = self.other(line, families, &answers, is_urgent).await;
+                    against = other.map_err(NotSame::Failed)?.found;
                     // By the words of another maker even a reset may start the motor.
                     is_judged |= against.is_some();
                 }
@@ -153,15 +162,33 @@ impl SameUnit {
         families: &Families,
         is_urgent: bool,
     ) -> Result<Option<Contradiction>, E> {
-        let mut answers = Vec::new();
-        self.ask(line, &mut answers, is_urgent).await?;
-        let now = line.now();
-        self.identity.with(|known| known.heard = Some(now));
-        let against = match self.family.contradiction(&answers) {
-            None => self.other(line, families, &answers, is_urgent).await?,
-            against => against,
-        };
-        if against.is_some() {
+        Ok(self.against(line, families, is_urgent).await?.found)
+    }
+
+    /// The same, and whether nothing is left open.
+    pub(crate) async fn against<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        families: &Families,
+        is_urgent: bool,
+    ) -> Result<Against, E> {
+        let (mut answers, mut against);
+        loop {
+            let opened = line.connection();
+            answers = Vec::new();
+            self.ask(line, &mut answers, is_urgent).await?;
+            let now = line.now();
+            self.identity.with(|known| known.heard = Some(now));
+            against = match self.family.contradiction(&answers) {
+                None => self.other(line, families, &answers, is_urgent).await?,
+                found => Against { found, is_whole: true },
+            };
+            // Two drives may have answered where the port was opened again in between.
+            if line.connection() == opened {
+                break;
+            }
+        }
+        if against.found.is_some() {
             self.identity.is_another();
         } else if self.identity.with(|known| known.told.is_none()) {
             let connection = line.connection();
@@ -202,16 +229,16 @@ impl SameUnit {
         families: &Families,
         answers: &[Answer],
         is_urgent: bool,
-    ) -> Result<Option<Contradiction>, E> {
+    ) -> Result<Against, E> {
         if answers.iter().any(|answer| answer.passes()) || !self.family.is_suspicious(answers) {
-            return Ok(None);
+            return Ok(Against { found: None, is_whole: !answers.iter().any(|&answer| self.is_busy(answer)) });
         }
         let told = answers.iter().filter(|answer| !self.family.is_put_off_by(**answer));
         let mut asked: Asked = told.map(|answer| (answer.place, answer.word().is_some())).collect();
         // Each question has its own place.
         let read = Read::word(self.unit, Place::from(0)).urgent(is_urgent);
         let shown = shown_by(line, families, read, &mut asked).await?;
-        Ok(self.family.other_signature(shown))
+        Ok(Against { found: self.family.other_signature(shown), is_whole: !asked.is_wanting() })
     }
 
     /// Adds the unit's answers to `answers` as they come, so that a failure of the line leaves the earlier ones.
@@ -252,6 +279,11 @@ impl SameUnit {
     /// Whether one of `answers` is a refusal that passes, so that it is not known yet what the unit is.
     fn is_put_off(&self, answers: &[Answer]) -> bool {
         answers.iter().any(|&answer| self.family.is_put_off_by(answer))
+    }
+
+    /// Whether `answer` says that it is busy.
+    fn is_busy(&self, answer: Answer) -> bool {
+        answer.exception().is_some_and(|code| self.family.meaning_of(code) == Meaning::AskAgain)
     }
 
     /// Whether there is a word by which a unit of the family shows what it is.

@@ -11,7 +11,30 @@ use crate::family::Family;
 use crate::task::{LineError, Mailbox, Read};
 
 /// Which words a unit answered, and which it refused.
-pub(crate) type Asked = BTreeMap<Place, bool>;
+#[derive(Debug, Default)]
+pub(crate) struct Asked {
+    known: BTreeMap<Place, bool>,
+    /// Whether a question brought neither.
+    is_wanting: bool,
+}
+
+impl Asked {
+    /// Whether it answered at `place`; `None` where it was not asked, or neither came.
+    pub(crate) fn get(&self, place: Place) -> Option<bool> {
+        self.known.get(&place).copied()
+    }
+
+    /// Whether a question brought neither an answer nor a refusal that counts.
+    pub(crate) fn is_wanting(&self) -> bool {
+        self.is_wanting
+    }
+}
+
+impl FromIterator<(Place, bool)> for Asked {
+    fn from_iter<I: IntoIterator<Item = (Place, bool)>>(known: I) -> Self {
+        Self { known: known.into_iter().collect(), is_wanting: false }
+    }
+}
 
 /// Those of `families` whose signature a unit shows, which is asked for more of it as in `read`.
 ///
@@ -45,16 +68,16 @@ async fn is_shown<E: LineError>(
     asked: &mut Asked,
 ) -> Result<bool, E> {
     for (place, wanted) in wanted(signature) {
-        let is_answered = match asked.get(&place) {
-            Some(&known) => known,
+        let is_answered = match asked.get(place) {
+            Some(known) => known,
             None => match answer_at(line, Read { place, ..read }).await {
-                Ok(answer) if answer.passes() => return Ok(false),
-                Ok(answer) => *asked.entry(place).or_insert(answer.word().is_some()),
-                Err(NotTold::Failed(error)) if !error.cause().is_no_answer() => {
-                    return Err(error);
+                Ok(answer) if !answer.passes() => *asked.known.entry(place).or_insert(answer.word().is_some()),
+                Err(NotTold::Failed(error)) if !error.cause().is_no_answer() => return Err(error),
+                // No signature has it.
+                Ok(_) | Err(_) => {
+                    asked.is_wanting = true;
+                    return Ok(false);
                 }
-                // Neither, then: no signature has it.
-                Err(_) => return Ok(false),
             },
         };
         if is_answered != wanted {

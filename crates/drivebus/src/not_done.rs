@@ -29,6 +29,7 @@ impl From<NotCommanded<Self>> for Error {
             WhyNotCommanded::NotReady(why) => of_its_own_kind(why.into()),
             WhyNotCommanded::NotSet(why) => of_its_own_kind(why.into()),
             WhyNotCommanded::NotWritten(why) => of_its_own_kind(why.into()),
+            WhyNotCommanded::HalfWritten(why) => (ErrorKind::Unconfirmed, why.into()),
             WhyNotCommanded::Failed(error) if is_half_done => (ErrorKind::Unconfirmed, error),
             WhyNotCommanded::Failed(error) | WhyNotCommanded::Halted(error) => of_its_own_kind(error),
             WhyNotCommanded::Unanswered { last, .. } | WhyNotCommanded::RefusedAndTurns { last, .. } => {

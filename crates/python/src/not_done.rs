@@ -50,6 +50,7 @@ fn why_not_commanded(py: Python<'_>, why: WhyNotCommanded<Failed>) -> PyResult<T
         Why::HaltedBetween(error) => {
             ("halted_between", error.map(|error| raised(py, error)).transpose()?.into_py_any(py)?)
         }
+        Why::HalfWritten(why) => ("half_written", written_told(py, why)?.into_py_any(py)?),
         Why::NotWritten(why) => ("not_written", written_told(py, why)?.into_py_any(py)?),
         Why::Unanswered { last, after: then } => ("unanswered", (raised(py, last)?, after(py, then)?).into_py_any(py)?),
         Why::RefusedAndTurns { last, look } => ("refused_and_turns", (raised(py, last)?, shown(look)).into_py_any(py)?),

@@ -53,6 +53,9 @@ def _sent(unit: DriveView, name: str, found: float, kind: str, told: Any) -> tup
         return _halted(unit, name), told
     if kind == "halted_between":
         return _halted_between(unit, name), None if told is None else _chained(_halted(unit, name), told)
+    if kind == "half_written":
+        cause = not_written.in_words(unit, *told)
+        return _half_written(unit, name, cause), cause
     if kind == "unanswered":
         error, after = told
         shown = after if isinstance(after, Exception) else glances.shown(unit, after)
@@ -85,13 +88,24 @@ def _chained(error: DrivebusError, cause: DrivebusError) -> DrivebusError:
 
 
 def _halted_between(unit: DriveView, name: str) -> Unconfirmed:
-    first = unit.profile.command_first(name)
-    place, word = (0, 0) if first is None else first
     return Unconfirmed(
-        f"unit {unit.address} was told to stop when {word} had been sent to {tables.shown(place)}, which comes before "
-        f"{said(name)}; the rest of it was not sent",
+        f"unit {unit.address} was told to stop when {_first(unit, name)}; the rest of it was not sent",
         unit=unit.address,
     )
+
+
+def _half_written(unit: DriveView, name: str, cause: DrivebusError) -> Unconfirmed:
+    return Unconfirmed(
+        f"unit {unit.address} runs, and {_first(unit, name)}; the rest of it came to nothing ({cause}): it may turn "
+        "the other way now. It was not repeated",
+        unit=unit.address,
+    )
+
+
+def _first(unit: DriveView, name: str) -> str:
+    first = unit.profile.command_first(name)
+    place, word = (0, 0) if first is None else first
+    return f"{word} had been sent to {tables.shown(place)}, which comes before {said(name)}"
 
 
 def _unanswered(unit: DriveView, name: str, error: DrivebusError, shown: str) -> Unconfirmed:

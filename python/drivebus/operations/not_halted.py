@@ -130,10 +130,13 @@ def _another(
     named: DriveView, unit: DriveView, command: str, against: Any, then: tuple[str, Any]
 ) -> tuple[DrivebusError, DrivebusError | None]:
     """It was taken by a unit that is another one than was halted, and why; and what that came of."""
-    error = _not_sent(named, unit, command, *then)
-    if not isinstance(error, NotAllowed):
+    reason, told = then
+    error = None if reason == "unsaid" else _not_sent(named, unit, command, reason, told)
+    if not isinstance(error, NotAllowed | None):
         return error, error.__cause__ if isinstance(error.__cause__, DrivebusError) else None
-    what = str(error) if against is None else f"{contradiction(named.profile, unit.address, against)}, and {error}"
+    what = "it did not say what it is instead" if error is None else str(error)
+    if against is not None:
+        what = f"{contradiction(named.profile, unit.address, against)}, and {what}"
     return Unconfirmed(
         f"{said(command)} was sent to unit {unit.address} and taken; but {what}. {MAY[command]}",
         unit=unit.address,

@@ -100,6 +100,14 @@ fn silence_is_no_evidence() {
     let mut aimed = Aimed::of("gd350");
     let mut answers = [Ok(0x0199), fails(Cause::NoAnswer)].into_iter();
     assert_eq!(aimed.stop(|_| answers.next().unwrap()), None);
+    // Also one that is busy.
+    let mut aimed = Aimed::of("gd350");
+    assert_eq!(aimed.stop(|_| refuses(0x06)), None);
+    assert_eq!(aimed.stop(|_| fails(Cause::NoAnswer)), None);
+    // So was one that spoke against its name when it was asked last.
+    let mut aimed = Aimed::of("gd350");
+    aimed.same.identity().is_another();
+    assert_eq!(aimed.stop(|_| fails(Cause::NoAnswer)), None);
 }
 
 #[test]

@@ -54,6 +54,9 @@ pub enum WhyNotCommanded<E> {
     /// The word that comes before it was sent, and then the unit was told to halt. The rest was not sent.
     #[error("the unit was told to stop when the word before it was sent; the rest of it was not sent")]
     HaltedBetween(Option<E>),
+    /// The unit runs and took the word that says which way. The rest was not sent, or it refused that.
+    #[error("the motor runs, and the word that says which way was taken; the rest was not: {0}")]
+    HalfWritten(NotWritten<E>),
     /// It was not sent, or the unit refused it.
     #[error("{0}")]
     NotWritten(NotWritten<E>),
@@ -143,6 +146,7 @@ impl<E: LineError> WhyNotCommanded<E> {
     pub fn may_have_acted(&self) -> bool {
         match self {
             Self::HaltedBetween(_)
+            | Self::HalfWritten(_)
             | Self::Unanswered { .. }
             | Self::RefusedAndTurns { .. }
             | Self::PortLost(_)

@@ -315,6 +315,42 @@ fn the_way_alone_moves_a_motor_that_runs() {
     assert!(!called.done.unwrap_err().why.may_have_acted());
 }
 
+/// It took the first word, and does not say any more what it is when the second is due.
+#[test]
+fn the_way_alone_is_told_where_the_other_word_is_held_back() {
+    for (runs, moves) in [(1, true), (0, false)] {
+        let drive = Obeys::new("wj200", &[(0x1003, runs)], &[]);
+        let called =
+            carried_out(Script::new(), drive.seen(true), Forgets { drive, is_told: false }, Start::run(true, None));
+        assert_eq!(called.sent(), [coil(1, 1)]);
+        let error = called.done.unwrap_err();
+        assert_eq!(error.why.may_have_acted(), moves, "{error}");
+        assert_eq!(matches!(error.why, Why::HalfWritten(_)), moves, "{error}");
+    }
+}
+
+/// A drive that is silent when it is asked what it is, and refuses that when it was written to.
+struct Forgets {
+    drive: Obeys,
+    is_told: bool,
+}
+
+impl scripted::Unit for Forgets {
+    fn read(&mut self, read: Read, now: Instant) -> Reply {
+        let is_question = !read.is_stamped && read.place == Place::from(0x1003);
+        match self.is_told {
+            false if is_question => fails(Cause::NoAnswer),
+            true if is_question => refuses(0x02),
+            _ => self.drive.read(read, now),
+        }
+    }
+
+    fn write(&mut self, write: &Write, now: Instant) -> Result<(), Fault> {
+        self.is_told = true;
+        self.drive.write(write, now)
+    }
+}
+
 /// A drive that refuses what is written to one place.
 struct Coil {
     drive: Obeys,

@@ -396,6 +396,30 @@ fn what_is_acknowledged_went_out() {
     assert!(halted.done.unwrap_err().was_sent);
 }
 
+/// An EDS300 whose first answer is lost, and that is busy then; EDS300 manual, p. 46: 6 stops it.
+#[test]
+fn one_that_is_busy_has_not_said_what_it_is() {
+    struct Busy(Arc<Family>, usize);
+
+    impl Unit for Busy {
+        fn read(&mut self, read: Read, _: Instant) -> Reply {
+            self.1 += 1;
+            match self.1 {
+                1 => fails(Cause::NoAnswer),
+                2 => refuses(0x06),
+                _ => like(&self.0, &[(0x2100, 1)])(read),
+            }
+        }
+
+        fn write(&mut self, _: &Write, _: Instant) -> Result<(), Fault> {
+            Ok(())
+        }
+    }
+
+    let halted = halt(&shipped("gd20"), order(Command::Stop), Busy(shipped("eds300"), 0));
+    assert_eq!(halted.words(), [5, 6]);
+}
+
 #[test]
 fn what_is_refused_each_time_was_not_taken() {
     let unit = Whatever { replies: vec![Ok(1)], confirms: vec![refuses(0x04)], asked: 0, sent: 0 };

@@ -11,10 +11,25 @@ use crate::asked::NotTold;
 use crate::contradiction::Contradiction;
 use crate::families::Families;
 use crate::harm::What;
+use crate::same_unit::Against;
 use crate::task::{Cause, LineError, Mailbox};
 
 /// Time for which a unit that does not show a halt is asked what it is, while it is not heard.
 const ASKED_FOR: Duration = Duration::from_secs(1);
+
+/// What came of it where a unit had to say anew what it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Anew {
+    /// It is another one, and was halted as that.
+    Another,
+    /// It is what was halted.
+    Same,
+    /// It did not say, or had to say it before.
+    Unsaid,
+}
+
+/// How often a unit is asked once more what it is that answered in part only.
+const AGAIN: u32 = 4;
 
 impl<E: LineError> Halt<E> {
     /// The looks that prove the halt that was taken, once the unit has said that it is what was halted.
@@ -44,13 +59,13 @@ impl<E: LineError> Halt<E> {
         }
     }
 
-    /// Whether it was halted once more, as another family: it does not show the halt, and shows that family now.
+    /// Has the unit say anew what it is. One that shows another family is halted once more, as that.
     ///
     /// A port that stayed open may have another drive behind it, whatever the line knew of the one before. Where no answer
     /// comes it is asked again, until none has come for a second: an answer that was lost is no reason to let it run.
-    pub(super) async fn vouch_anew(&mut self, line: &Mailbox<E>, families: &Families) -> Result<bool, Why<E>> {
+    pub(super) async fn vouch_anew(&mut self, line: &Mailbox<E>, families: &Families) -> Result<Anew, Why<E>> {
         if !self.aim.doubt(families) {
-            return Ok(false);
+            return Ok(Anew::Unsaid);
         }
         let began = line.now();
         let mut heard = began;
@@ -61,7 +76,7 @@ impl<E: LineError> Halt<E> {
                     // One question alone may take seconds: what it heard before the last counts.
                     let is_silent = self.aim.heard() <= heard && line.now() >= heard + ASKED_FOR;
                     if is_silent || line.now() >= began + self.order.within {
-                        return Ok(false);
+                        return Ok(Anew::Unsaid);
                     }
                     heard = heard.max(self.aim.heard());
                     line.sleep(PAUSE).await
@@ -74,7 +89,7 @@ impl<E: LineError> Halt<E> {
             };
             if let Err(error) = failed {
                 return match error.cause() {
-                    Cause::Port => Ok(false),
+                    Cause::Port => Ok(Anew::Unsaid),
                     Cause::Other | Cause::Halted => {
                         Err(Why::Another { against: None, then: Box::new(Why::Failed(error)) })
                     }
@@ -84,12 +99,12 @@ impl<E: LineError> Halt<E> {
         };
         let taken = self.named.taken_for(&target.family, &self.record, line.connection());
         if Arc::ptr_eq(taken.same().family(), self.unit.same().family()) {
-            return Ok(false);
+            return Ok(Anew::Same);
         }
         self.unit.same().identity().is_another();
         self.until = line.now() + self.order.within;
         self.once_more(line, families).await?;
-        Ok(true)
+        Ok(Anew::Another)
     }
 
     /// Whether it was halted once more, as another family, although it showed the halt: in the words of that one.
@@ -98,22 +113,25 @@ impl<E: LineError> Halt<E> {
     /// was opened again since, what showed the halt may be a drive that never got it: that has to say what it is.
     pub(super) async fn was_another(&mut self, line: &Mailbox<E>, families: &Families) -> Result<bool, Why<E>> {
         let same = self.unit.same();
-        if line.connection() != self.connection {
-            return match self.contradiction(line, families).await? {
-                None => Ok(false),
-                Some(_) => self.vouch_anew(line, families).await,
-            };
-        }
-        let is_harmless = || families.harmed(What::Command(self.command), same.family()).is_empty();
-        if !same.identity().is_old(line.now()) || is_harmless() {
-            return Ok(false);
-        }
-        match same.contradiction(line, families, true).await {
-            Ok(None) => Ok(false),
-            Ok(Some(_)) => self.vouch_anew(line, families).await,
-            // What it showed stands: nothing speaks against it.
-            Err(error) if error.cause().is_of_the_line() => Ok(false),
-            Err(error) => Err(Why::Failed(error)),
+        let against = if line.connection() == self.connection {
+            let is_harmless = || families.harmed(What::Command(self.command), same.family()).is_empty();
+            if !same.identity().is_old(line.now()) || is_harmless() {
+                return Ok(false);
+            }
+            match same.contradiction(line, families, true).await {
+                Ok(against) => against,
+                // What it showed stands: nothing speaks against it.
+                Err(error) if error.cause().is_of_the_line() => None,
+                Err(error) => return Err(Why::Failed(error)),
+            }
+        } else {
+            self.contradiction(line, families).await?
+        };
+        let Some(against) = against else { return Ok(false) };
+        match self.vouch_anew(line, families).await? {
+            Anew::Another => Ok(true),
+            Anew::Same => Ok(false),
+            Anew::Unsaid => Err(Why::Another { against: Some(Box::new(against)), then: Box::new(Why::Unsaid) }),
         }
     }
 
@@ -124,15 +142,21 @@ impl<E: LineError> Halt<E> {
     }
 
     /// What the unit says against its name; asked for until it is answered, for as long as a halt is sent.
+    ///
+    /// Where a question brought nothing, all are put again; but not for long, since a drive may never answer one.
     async fn contradiction(&self, line: &Mailbox<E>, families: &Families) -> Result<Option<Contradiction>, Why<E>> {
-        let until = line.now() + self.order.within;
+        let (same, until) = (self.unit.same(), line.now() + self.order.within);
+        let mut times = 0;
         loop {
-            match self.unit.same().contradiction(line, families, true).await {
-                Ok(found) => return Ok(found),
+            let is_over = || line.now() >= until || line.is_closed();
+            match same.against(line, families, true).await {
+                Ok(Against { found: None, is_whole: false }) if times < AGAIN && !line.is_closed() => times += 1,
+                Ok(Against { found, .. }) => return Ok(found),
                 Err(error) if !error.cause().is_of_the_line() => return Err(Why::Failed(error)),
-                Err(error) if line.now() >= until || line.is_closed() => return Err(Why::Unasked(error)),
-                Err(_) => line.sleep(PAUSE).await.map_err(Why::Failed)?,
+                Err(error) if is_over() => return Err(Why::Unasked(error)),
+                Err(_) => {}
             }
+            line.sleep(PAUSE).await.map_err(Why::Failed)?;
         }
     }
 }

@@ -70,6 +70,11 @@ impl Identity {
         })
     }
 
+    /// Whether what it said when it was asked last speaks against its name, over whatever connection.
+    pub fn contradicts(&self) -> bool {
+        self.with(|known| known.contradicts)
+    }
+
     /// Whether a word at `place` was found to do no harm to it, over this connection.
     pub fn is_harmless(&self, place: Place, connection: u64) -> bool {
         self.with(|known| known.harmless.contains(&place) && known.connection == connection)

@@ -4,8 +4,8 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::harm::What;
-use crate::scripted::{Fault, Reply, Script, UNIT, any_family, any_reply, fails, like, refuses, shipped};
-use crate::task::Cause;
+use crate::scripted::{self, Fault, Reply, Script, UNIT, any_family, any_reply, fails, like, refuses, shipped};
+use crate::task::{Cause, Write};
 
 /// A unit that was named as one of a family, and its line.
 struct Named {
@@ -71,6 +71,38 @@ fn it_is_asked_once_for_each_connection() {
     assert_eq!(named.check(true, gd350).unwrap(), 1);
     assert_eq!(named.script.places(), [0x2103]);
     assert!(named.is_known() && named.is_sure());
+}
+
+/// A VFD500 until its second question, and then a GD350 behind a port that was opened again.
+struct Exchanged {
+    asked: u64,
+}
+
+impl scripted::Unit for Exchanged {
+    fn read(&mut self, read: Read, _: Instant) -> Reply {
+        self.asked += 1;
+        if self.asked > 1 { gd350(read) } else { like(&shipped("vfd500"), &[])(read) }
+    }
+
+    fn write(&mut self, write: &Write, _: Instant) -> Result<(), Fault> {
+        panic!("nobody expects {write}")
+    }
+
+    fn reopened(&self) -> u64 {
+        (self.asked > 1).into()
+    }
+}
+
+#[test]
+fn what_two_drives_answered_in_turns_is_asked_anew() {
+    let same = Named::of("vfd500").same;
+    let mut script = Script::new();
+    let against = script.carry_out(Exchanged { asked: 0 }, |line| async move {
+        same.contradiction(&line, Families::shipped(), true).await
+    });
+    assert!(against.unwrap().is_some());
+    let places = script.places();
+    assert!(places[1..].contains(&places[0]), "{places:X?}");
 }
 
 #[test]
