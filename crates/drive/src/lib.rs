@@ -71,6 +71,7 @@
 //! | `given` | what a drive is given over the bus besides its frequency |
 //! | `bits` | words whose bits are things of their own: terminals, and the special control word |
 //! | `values` | values read by name |
+//! | `bus_timeout` | a drive's own time-out of the bus: set, kept from running out, and given back |
 //! | `status` | what a drive does at one moment |
 //! | `waits` | waiting until a motor has reached its speed, or stands |
 //! | `task` | operations that wait for a line, and how they are driven without one |
@@ -82,6 +83,7 @@ mod answer;
 mod apart;
 mod asked;
 mod bits;
+mod bus_timeout;
 mod codes;
 mod command;
 mod contradiction;
@@ -123,6 +125,7 @@ pub use answer::{Answer, Said, meanings};
 pub use apart::{Apart, Verdict};
 pub use asked::{NotTold, answer_at, answer_once};
 pub use bits::{FieldInput, NotSetBits};
+pub use bus_timeout::{Back, BusTimeout, NotArmable, NotArmed, NotAsked, NotGivenBack, OnSilence, WhyNotArmed};
 pub use codes::Codes;
 pub use command::{NotCommanded, NotLedUp, Start, WhyNotCommanded, WhyNotLedUp};
 pub use contradiction::Contradiction;

@@ -59,6 +59,11 @@ impl<'p> Rule<'p> {
         Self { profile, trusts_all: is_trusted }
     }
 
+    /// What is known of the family.
+    pub(crate) const fn profile(&self) -> &'p Profile {
+        self.profile
+    }
+
     /// Whether all that the profile knows may be used, whatever proves it.
     pub(crate) const fn trusts_all(&self) -> bool {
         self.trusts_all

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use drivebus_drives::{Entry, Place, Profile, Setpoint, Value};
+use drivebus_drives::{Entry, Place, Profile, Setpoint, State, Value};
 use drivebus_rtu::UnitAddress;
 
 use crate::family::Family;
@@ -82,6 +82,11 @@ impl Unit {
         self.parts.fetch_add(1, Ordering::Relaxed);
     }
 
+    /// The same unit in another call, of which is counted apart what it takes.
+    pub(crate) fn apart(&self) -> Self {
+        Self { parts: Arc::default(), ..self.clone() }
+    }
+
     /// The same call, whose words are known better: by `profile`.
     pub(crate) fn with_profile(&self, profile: &Arc<Profile>) -> Self {
         Self { taken: self.taken.with_profile(profile), ..self.clone() }
@@ -120,20 +125,25 @@ impl Unit {
 
     /// Asks for one word, which tells whether it answers: its state, or else what of it may be read. `false` where nothing may.
     pub(crate) async fn ping<E>(&self, line: &Mailbox<E>) -> Result<bool, E> {
-        let profile = self.profile();
-        if self.tells_its_state()
-            && let Some(place) = profile.role("state").and_then(Entry::place)
-        {
-            let word = self.word(line, place).await?;
-            line.taken_for(self.family()).tell(Notice::Shows(profile.state(word))).await;
-            return Ok(true);
+        if self.tells_its_state() {
+            return self.state(line).await.map(|_| true);
         }
+        let profile = self.profile();
         let roles = ["state", "fault"].into_iter().filter_map(|role| profile.role(role));
         let mut known = roles.chain(profile.monitor()).chain(profile.entries());
         let Some(place) = known.find(|entry| self.rule().read(entry).is_ok()).and_then(Entry::place) else {
             return Ok(false);
         };
         self.word(line, place).await.map(|_| true)
+    }
+
+    /// What its state word says, read alone. Its states may be used.
+    pub(crate) async fn state<E>(&self, line: &Mailbox<E>) -> Result<State, E> {
+        // What may be used has an address.
+        let Some(place) = self.profile().role("state").and_then(Entry::place) else { return Ok(State::Unknown) };
+        let state = self.profile().state(self.word(line, place).await?);
+        line.taken_for(self.family()).tell(Notice::Shows(state)).await;
+        Ok(state)
     }
 
     /// The word at `place`.
