@@ -182,7 +182,6 @@ OPERATIONS = [
     "setpoints",
     "not_led_up",
     "not_commanded",
-    "speed",
     "not_halted",
     "halting",
     "motion",

@@ -19,13 +19,13 @@ _Writable: TypeAlias = tuple[str, int, list[int] | None, str, int | None, str, i
 
 __version__: Final[str]
 __all__ = [
-    "FALL_PATIENCE",
     "HALT_WITHIN",
     "STANDSTILL",
     "STORES_BEFORE_NOTICE",
     "Asked",
     "Batch",
     "Bus",
+    "BusTimeout",
     "Family",
     "Gateway",
     "Halt",
@@ -85,7 +85,6 @@ __all__ = [
     "usable",
 ]
 
-FALL_PATIENCE: Final[float]
 """Seconds of the line's clock in which the frequency of a motor that stops must fall: even a ramp of an hour takes off
 a hundredth of a hertz in that time."""
 
@@ -614,7 +613,7 @@ def usable(certainty: str, candidates: Sequence[str], unverified: bool, /) -> st
 
 @final
 class Looks:
-    """What is looked at of units of one family: what a drive is doing, and how fast its motor turns.
+    """What is looked at of units of one family: what a drive is doing.
 
     What no document of the family prints is left out, unless it is trusted. Each task is for one unit (0..=255), asks
     before all who wait where it is urgent, and fails as the bus does.
@@ -638,10 +637,6 @@ class Looks:
         That is the state, its word or None, the number of the fault or None, whether it is in that, the bit fields with
         what they mean, and the Unix time at which the first of it was asked for.
         """
-    def output_frequency(self, unit: int, /) -> Task:
-        """Comes to the output frequency in Hz; to None where the family does not tell."""
-    def turns_in_spite_of(self, unit: int, state: str, /) -> Task:
-        """Comes to whether a motor whose *state* says that it rests turns. NotAllowed: there is no such state."""
 
 @final
 class Task:
@@ -777,6 +772,8 @@ class Unit:
         """Waits until the motor runs at *hz*, None: its setpoint. A status; or `"not_reached"`, `"not_settled"`."""
     def wait_until_stopped(self, timeout: float, /) -> Task:
         """Waits until the motor stands. A status; or `"not_reached"`, `"not_settled"`."""
+    def comes_to_rest(self) -> Task:
+        """Waits while the motor slows down: whether it rests then. Or `"unseen"`: its state may not be used."""
     def control(self, setpoint: str, /) -> Task:
         """What must be set so that the bus commands the drive, and gives it *setpoint*: settings."""
 
@@ -811,6 +808,47 @@ class Values:
         """Gives a setpoint, if the drive heeds it. Or `"not_given"`."""
     def set_bits(self, setpoint: str, fields: Sequence[tuple[str, bool | int | str]], force: bool, /) -> Task:
         """Sets bits of a word, over a bad link too where *force*. Or `"not_set_bits"`, `"not_commanded"`."""
+
+@final
+class BusTimeout:
+    """A drive's own time-out of the bus: what is set in it, and what it had before.
+
+    The result of each task is `"done"`; or a kind of reason, and what is told of it, as of `Values`, and besides:
+
+    `"not_armed"` has the kind: `"may_not"` and a name; `"not_settled"`; `"failed"` and the error; `"not_kept"`;
+    `"others"` and names with the values and units that are shown. What is told of that, whether the unit has a part of
+    it, and None or what `"not_kept"` tells, if it could not be given back what it had. `"not_asked"` has the error, or
+    None where nothing of the unit may be read, and whether the line was closed for good.
+    """
+
+    @staticmethod
+    def of(rule: Rule, timeout: object, action: object, /) -> tuple[str, Any]:
+        """`"done"` and the time-out of *timeout* seconds, after which the drive does *action*. Nothing is sent.
+
+        Or why that may not be: `"no_timeout"`; `"only_stored"`; `"not_printed"`; `"out_of_range"` and the longest or
+        None; `"no_action"`. NotAllowed: the drive does not count such a time.
+        """
+    @property
+    def seconds(self) -> float:
+        """Seconds of silence after which the drive acts."""
+    @property
+    def action(self) -> str:
+        """What it then does: `"coast"`, `"stop"` or `"trip"`."""
+    @property
+    def is_armed(self) -> bool:
+        """Whether the drive acts by itself when it hears nothing."""
+    @property
+    def may_be_set(self) -> bool:
+        """Whether the drive may have some of it: then a `set` that did not come to its end is put back."""
+    @property
+    def interval(self) -> float:
+        """Seconds between two questions that keep the drive from acting."""
+    def set(self, unit: Unit, /) -> Task:
+        """Sets it, and reads it back. Where that fails the unit gets back what it had. Or `"not_armed"`."""
+    def put_back(self, unit: Unit, /) -> Task:
+        """Gives the unit what it had. Or `"not_kept"`."""
+    def ask(self, unit: Unit, /) -> Task:
+        """Asks for one word. Or `"not_asked"`."""
 
 @final
 class Halt:

@@ -7,16 +7,18 @@ test_end_of_program.py.
 
 from __future__ import annotations
 
+import itertools
 import shutil
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import drivebus
 from drivebus import Bus, Drive, Simulator
-from drivebus.operations import registers
-from drivebus.operations.drive_view import DriveView
+from drivebus.line.asking import Read, Stamped
+from drivebus.line.blocking import BlockingBus
 
 RAM, ACTION, TIMEOUT = 0x8000, 0x0E05, 0x0E04
 CE = 18
@@ -156,16 +158,29 @@ def test_a_drive_that_refuses_keeps_what_it_had(virtual: Simulator, virtual_driv
     assert settings(virtual) == (0, 0)
 
 
+def asked_of(monkeypatch: pytest.MonkeyPatch, before: Callable[[int], None]) -> None:
+    """Calls *before* each read of the bus from now on, with how many there were."""
+    ask, reads = BlockingBus.ask_stamped, itertools.count()
+
+    async def asked(self: BlockingBus, request: Read) -> Stamped:
+        before(next(reads))
+        return await ask(self, request)
+
+    monkeypatch.setattr(BlockingBus, "ask_stamped", asked)
+
+
 def test_a_drive_that_shows_something_else_gets_back_what_it_had(
     virtual: Simulator, virtual_drive: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shown = iter([{"P14.04": 0.0, "P14.05": 2}, {"P14.04": 1.0, "P14.05": 2}])
+    virtual_drive.write("P14.05", 2, unverified=True)
 
-    async def snapshot(*_: object) -> object:
-        return next(shown)
+    def before(read: int) -> None:
+        if read == 1:
+            # P14.04 = 1.0 s and P14.05 = 2, for what was written.
+            virtual.line.answer_with(bytes.fromhex("01 03 04 00 0A 00 02 5B F0"))
 
-    monkeypatch.setattr(registers, "snapshot", snapshot)
-    with pytest.raises(drivebus.Unconfirmed, match=r"unit 1 took .* and shows"):
+    asked_of(monkeypatch, before)
+    with pytest.raises(drivebus.Unconfirmed, match=r"unit 1 took .* and shows P14\.05 = 2, P14\.04 = 1 s; it has back"):
         virtual_drive.watchdog(1.0, unverified=True)
     assert settings(virtual) == (0, 2)
 
@@ -173,16 +188,11 @@ def test_a_drive_that_shows_something_else_gets_back_what_it_had(
 def test_one_that_is_interrupted_gives_back_what_the_drive_had(
     virtual: Simulator, virtual_drive: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    snapshot = registers.snapshot
-    asked: list[str] = []
-
-    async def interrupted(unit: DriveView, *names: str) -> drivebus.Snapshot:
-        asked.extend(names)
-        if len(asked) > len(names):
+    def before(read: int) -> None:
+        if read == 1:
             raise KeyboardInterrupt
-        return await snapshot(unit, *names)
 
-    monkeypatch.setattr(registers, "snapshot", interrupted)
+    asked_of(monkeypatch, before)
     with pytest.raises(KeyboardInterrupt):
         virtual_drive.watchdog(1.0, unverified=True)
     assert written(virtual)[:2] == [(ACTION, 0), (TIMEOUT, 10)]

@@ -9,6 +9,7 @@ mod aim;
 mod arguments;
 mod attendant;
 mod bus;
+mod bus_timeout;
 mod clock;
 mod convert;
 mod ending;
@@ -57,6 +58,8 @@ mod _native {
     use crate::aim::goes_out_at_once;
     #[pymodule_export]
     use crate::bus::Bus;
+    #[pymodule_export]
+    use crate::bus_timeout::BusTimeout;
     #[pymodule_export]
     use crate::ending::{begin_of_child, end_of_program};
     #[pymodule_export]
@@ -113,7 +116,6 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        module.add("FALL_PATIENCE", drivebus_drive::Fall::PATIENCE.as_secs_f64())?;
         module.add("STORES_BEFORE_NOTICE", drivebus_drive::Record::STORES_BEFORE_NOTICE)?;
         module.add("HALT_WITHIN", drivebus_drive::Order::WITHIN.as_secs_f64())?;
         module.add("STANDSTILL", drivebus_drive::STANDSTILL)?;

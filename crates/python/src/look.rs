@@ -1,16 +1,13 @@
-//! `Looks` for Python: what a drive is doing, and how fast its motor turns.
+//! `Looks` for Python: what a drive is doing.
 
 use std::sync::Arc;
 
-use drivebus_drive::task::Mailbox;
 use drivebus_drive::{self as drive, Look};
 use drivebus_drives::{Entry, State};
-use drivebus_rtu::UnitAddress;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
 use crate::convert::any_unit;
-use crate::errors::bad_argument;
 use crate::profile::Profile;
 use crate::shown_look::shown;
 use crate::task::{Failed, Task};
@@ -65,36 +62,11 @@ impl Looks {
             |py, look: Result<Look, Failed>| shown(look?).into_py_any(py),
         ))
     }
-
-    #[pyo3(signature = (unit, /))]
-    fn output_frequency(&self, unit: &Bound<'_, PyAny>) -> PyResult<Task> {
-        self.asked(unit, async move |speeds, line, unit| speeds.output(&line, unit, false).await)
-    }
-
-    #[pyo3(signature = (unit, state, /))]
-    fn turns_in_spite_of(&self, unit: &Bound<'_, PyAny>, state: &str) -> PyResult<Task> {
-        let state = State::named(state).ok_or_else(|| bad_argument(format!("state {state:?} is none")))?;
-        self.asked(unit, async move |speeds, line, unit| speeds.turns_in_spite_of(state, &line, unit, false).await)
-    }
 }
 
 impl Looks {
     /// The unit as it was named, under the trust of these.
     pub(crate) fn taken(&self, same: drive::SameUnit) -> drive::Taken {
         drive::Taken::as_named(same, &self.looks, &self.speeds)
-    }
-
-    fn asked<T, F>(
-        &self,
-        unit: &Bound<'_, PyAny>,
-        operation: impl FnOnce(Arc<drive::Speeds>, Mailbox<Failed>, UnitAddress) -> F,
-    ) -> PyResult<Task>
-    where
-        T: for<'py> IntoPyObject<'py> + Send + 'static,
-        F: Future<Output = Result<T, Failed>> + Send + 'static,
-    {
-        let unit = any_unit(unit)?;
-        let speeds = Arc::clone(&self.speeds);
-        Ok(Task::of(|line| operation(speeds, line, unit), |py, told: Result<T, Failed>| told?.into_py_any(py)))
     }
 }

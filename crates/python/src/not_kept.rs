@@ -65,7 +65,7 @@ pub(crate) fn not_set_bits(py: Python<'_>, why: NotSetBits<Failed>) -> PyResult<
 }
 
 /// What was written before, and of which kind the reason is.
-fn not_kept_told(py: Python<'_>, error: NotKept<Failed>) -> PyResult<Py<PyAny>> {
+pub(crate) fn not_kept_told(py: Python<'_>, error: NotKept<Failed>) -> PyResult<Py<PyAny>> {
     let (kind, told) = kept_told(py, *error.why)?;
     (error.done, kind, told).into_py_any(py)
 }
@@ -120,6 +120,6 @@ fn in_force_told(py: Python<'_>, told: InForce<Failed>) -> PyResult<Told> {
 }
 
 /// A name, a value and its unit.
-fn held(held: Held) -> (String, f64, String) {
+pub(crate) fn held(held: Held) -> (String, f64, String) {
     (held.name, Value::to_f64(held.value), held.unit)
 }

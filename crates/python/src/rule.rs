@@ -21,7 +21,7 @@ pub(crate) struct Rule {
 type Told = Option<(&'static str, String)>;
 
 impl Rule {
-    fn core(&self) -> Core<'_> {
+    pub(crate) fn core(&self) -> Core<'_> {
         Core::of(&self.profile, self.trusts_all)
     }
 }

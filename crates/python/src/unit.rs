@@ -5,6 +5,7 @@ use drivebus_drive::{self as drive, Families, Setting, Start, Words};
 use drivebus_drives::{Place, Profile, Setpoint};
 use pyo3::prelude::*;
 
+use crate::bus_timeout::rests;
 use crate::clock::duration;
 use crate::convert::place_of;
 use crate::errors::bad_argument;
@@ -120,6 +121,10 @@ impl Unit {
     fn wait_until_stopped(&self, timeout: f64) -> Task {
         let within = time_limit(timeout);
         self.task(move |unit, line| async move { unit.wait_until_stopped(&line, within).await }, waited)
+    }
+
+    fn comes_to_rest(&self) -> Task {
+        self.task(|unit, line| async move { unit.comes_to_rest(&line).await }, rests)
     }
 
     #[pyo3(signature = (setpoint, /))]

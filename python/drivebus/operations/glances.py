@@ -18,10 +18,7 @@ from drivebus.profile.evidence import Evidence
 from drivebus.profile.profile import native_of
 from drivebus.values import State
 
-__all__ = ["POLL_INTERVAL", "glance", "keep", "planned", "remember", "seen_last", "shown"]
-
-POLL_INTERVAL = 0.02
-"""Seconds of the line's clock between two looks at the state."""
+__all__ = ["glance", "keep", "planned", "remember", "seen_last", "shown"]
 
 
 class _Plan(NamedTuple):

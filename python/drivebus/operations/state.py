@@ -26,6 +26,7 @@ __all__ = [
     "fault",
     "fault_history",
     "look",
+    "nothing_to_ask",
     "ping",
     "read_off",
     "shown",
@@ -77,7 +78,12 @@ async def ping(unit: DriveView) -> None:
     for name in unit.evidence.readable(name for name in named if name is not None):
         await read_words(unit, unit.profile.address(name))
         return
-    raise BadArgument(f"nothing is known that {unit.profile.title} answers, so unit {unit.address} was not asked")
+    raise nothing_to_ask(unit)
+
+
+def nothing_to_ask(unit: DriveView) -> BadArgument:
+    """The error for a unit of whose family nothing may be read."""
+    return BadArgument(f"nothing is known that {unit.profile.title} answers, so unit {unit.address} was not asked")
 
 
 async def status(unit: DriveView, *, unverified: bool = False) -> Status:
