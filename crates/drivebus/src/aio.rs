@@ -22,9 +22,11 @@ mod drive;
 mod poll;
 mod running;
 mod slot;
+mod watchdog;
 
 pub use asked::Asked;
 pub use bus::Bus;
 pub use drive::Drive;
 pub use poll::Poll;
 pub use running::Running;
+pub use watchdog::Watchdog;

@@ -63,8 +63,8 @@
 //!
 //! # Limits
 //!
-//! - Backups, and the drive's own watchdog, are in the Python package.
-//! - A process that is killed stops no motor. Whoever needs that sets the drive's own time-out of the bus.
+//! - Backups are in the Python package.
+//! - A process that is killed stops no motor. Whoever needs that sets the drive's [watchdog](Drive::watchdog).
 //! - It is no safety function. An emergency stop is a wire.
 
 #![forbid(unsafe_code)]
@@ -78,6 +78,7 @@ mod error;
 mod given;
 mod halting;
 mod named;
+mod not_armed;
 mod not_done;
 mod not_kept;
 mod operations;
@@ -90,6 +91,7 @@ mod running;
 #[cfg(feature = "sim")]
 mod simulated;
 mod status;
+mod watchdog;
 mod writes;
 
 pub use builder::Builder;
@@ -103,6 +105,7 @@ pub use poll::{Poll, Sample, Target};
 pub use reading::{Reading, Values};
 pub use running::Running;
 pub use status::Status;
+pub use watchdog::Watchdog;
 
 pub use drivebus_drive as drive;
 pub use drivebus_drives as drives;
@@ -111,7 +114,7 @@ pub use drivebus_rtu as rtu;
 #[cfg(feature = "sim")]
 pub use drivebus_sim as sim;
 
-pub use drive::{FieldInput, Frequencies, Look, Setting, Start};
+pub use drive::{FieldInput, Frequencies, Look, OnSilence, Setting, Start};
 pub use drives::{Fault, Input, Profile, Setpoint, State, Store, Value};
 #[cfg(feature = "serial")]
 pub use line::rs485::Rs485;

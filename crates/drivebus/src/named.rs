@@ -80,6 +80,11 @@ impl Named {
         self.family.profile()
     }
 
+    /// What may be asked of it.
+    pub(crate) fn rule(&self) -> Rule<'_> {
+        Rule::of(self.profile(), self.is_unverified)
+    }
+
     /// How often it was started, or was about to be.
     pub(crate) fn starts(&self) -> u64 {
         self.record.sent().starts
@@ -87,7 +92,7 @@ impl Named {
 
     /// What ends what `start` starts.
     pub(crate) fn end_of(&self, start: &Start) -> Command {
-        let may = |command| Rule::of(self.profile(), self.is_unverified).command(command).is_ok();
+        let may = |command| self.rule().command(command).is_ok();
         if start.jogs && may(Command::JogStop) { Command::JogStop } else { Command::Stop }
     }
 
@@ -242,7 +247,7 @@ impl Named {
 
     /// In Hz, so that a family whose unit nobody knows, or is another one, tells nothing.
     async fn measured(&self, line: &Mailbox<Error>) -> Result<Option<Frequencies>, Error> {
-        let rule = Rule::of(self.profile(), self.is_unverified);
+        let rule = self.rule();
         let of_role = |role| self.profile().role(role).filter(|entry| rule.read(entry).is_ok());
         let names: Vec<_> = ["frequency", "setpoint"].into_iter().filter_map(of_role).map(Entry::name).collect();
         let profile = match self.call(line).settled(line, &names).await {
@@ -281,7 +286,7 @@ impl Named {
 
     async fn halted(&self, line: &Mailbox<Error>, order: Order) -> Result<(), NotHalted<Error>> {
         let named = self.to_halt_by(order.command);
-        let can_coast = || Rule::of(named.profile(), named.is_unverified).command(Command::Coast).is_ok();
+        let can_coast = || named.rule().command(Command::Coast).is_ok();
         let order = Order { coasts: order.coasts && can_coast(), ..order };
         let taken = named.taken(line);
         let mut halt = Halt::new(taken, &named.record, order, Families::shipped(), line.now());
@@ -304,12 +309,12 @@ impl Named {
         Taken::as_named(self.same(line), &self.looks, &self.speeds)
     }
 
-    fn call(&self, line: &Mailbox<Error>) -> drive::Unit {
+    pub(crate) fn call(&self, line: &Mailbox<Error>) -> drive::Unit {
         drive::Unit::new(self.taken(line), &self.record)
     }
 
     /// `error`, which may not say yet of whom.
-    fn tell(&self, what: &str, error: Error) -> Error {
+    pub(crate) fn tell(&self, what: &str, error: Error) -> Error {
         error.saying_first(format_args!("{what} of unit {}", self.address.get()))
     }
 
