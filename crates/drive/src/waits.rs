@@ -41,7 +41,7 @@ pub enum NotReached<E> {
         before: bool,
     },
     /// The time is over.
-    #[error("it is {0}")]
+    #[error("the time is over, and it is {0}")]
     Late(Status),
     /// It was not read.
     #[error("{0}")]

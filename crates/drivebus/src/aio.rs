@@ -22,6 +22,7 @@ mod drive;
 mod poll;
 mod running;
 mod slot;
+mod waiting;
 mod watchdog;
 
 pub use asked::Asked;

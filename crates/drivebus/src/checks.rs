@@ -62,6 +62,11 @@ pub(crate) fn time(what: &str, given: Duration) -> Result<(), Error> {
     Ok(())
 }
 
+/// A number that is not below 0.
+pub(crate) fn not_negative(what: &str, given: f64) -> Result<(), Error> {
+    if given.is_finite() && given >= 0.0 { Ok(()) } else { Err(out_of_range(what, given, "0 or more")) }
+}
+
 pub(crate) fn within<T: PartialOrd + Display + Copy>(what: &str, given: T, low: T, high: T) -> Result<(), Error> {
     if given < low || given > high {
         return Err(out_of_range(what, given, format!("{low} to {high}")));

@@ -91,6 +91,7 @@ mod running;
 #[cfg(feature = "sim")]
 mod simulated;
 mod status;
+mod waiting;
 mod watchdog;
 mod writes;
 

@@ -1,5 +1,7 @@
 //! A unit as a program named it, and what may be done with it: operations of the core, for who waits and for who awaits.
 
+mod waits;
+
 use std::sync::Arc;
 use std::time::Duration;
 

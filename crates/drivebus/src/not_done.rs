@@ -1,7 +1,8 @@
 //! Why something was not done to a unit: of which kind that is, in the core's words, and whether the unit may have acted.
 
 use drivebus_drive::{
-    NotCommanded, NotHalted, NotReady, NotSame, NotSet, NotSettled, NotTaken, NotWritten, Why, WhyNotCommanded,
+    NotCommanded, NotHalted, NotReached, NotRead, NotReady, NotSame, NotSet, NotSettled, NotTaken, NotWritten, Why,
+    WhyNotCommanded,
 };
 use drivebus_line::ErrorKind;
 
@@ -69,6 +70,17 @@ impl From<NotSettled<Self>> for Error {
     fn from(why: NotSettled<Self>) -> Self {
         match why {
             NotSettled::Failed(error) => error.having_acted(false),
+            why => Self::not_allowed(why),
+        }
+    }
+}
+
+impl From<NotReached<Self>> for Error {
+    fn from(why: NotReached<Self>) -> Self {
+        match why {
+            NotReached::NotRead(NotRead::Failed(error)) => error.having_acted(false),
+            NotReached::NotRead(NotRead::NotSettled(why)) => why.into(),
+            NotReached::Tripped { .. } | NotReached::Late(_) => Self::of(ErrorKind::Unconfirmed, why),
             why => Self::not_allowed(why),
         }
     }
