@@ -167,7 +167,7 @@ impl<'i> Line<'i> {
                     return done;
                 }
                 Ok(Step::Wish(wish)) => {
-                    let family = task.family().cloned();
+                    let family = task.taken_for().map(|(_, family)| Arc::clone(family));
                     Some(self.outcome_of(&wish, family.as_ref()))
                 }
                 Err(misuse) => unreachable!("{misuse}"),

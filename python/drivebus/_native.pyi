@@ -67,7 +67,7 @@ __all__ = [
     "forbidden",
     "frame_len",
     "frames_in",
-    "goes_out_at_once",
+    "halt_all",
     "huanyang_form",
     "identify",
     "is_write",
@@ -595,9 +595,6 @@ class SameUnit:
     def contradiction(self) -> Task:
         """Asks the unit what it is. Its result is what speaks against the family, or None."""
 
-def goes_out_at_once(unit: SameUnit, what: str | int, connection: int, /) -> bool:
-    """Whether nothing is asked before *what*, as for `Family`, is sent."""
-
 def identify(unit: int, /) -> Task:
     """Finds out what *unit* is, by reads of one word each.
 
@@ -668,10 +665,10 @@ class Task:
             RuntimeError: *outcome* is none of the last wish, or the task is done. It is as it was before.
         """
     @property
-    def family(self) -> str | None:
-        """As one of which family the unit of the last wish is taken, by the name of its profile; None: nobody says so.
+    def taken_for(self) -> tuple[int, str] | None:
+        """Of which unit the last wish is, and as which family that is taken, by the name of its profile.
 
-        Its refusals are told in the words of that family.
+        Its refusals are told in the words of that family. None: nobody says so; a notice always has it.
         """
 
 @final
@@ -852,17 +849,7 @@ class BusTimeout:
 
 @final
 class Halt:
-    """One unit that is to be halted: sent until it takes it, and proved.
-
-    The result of its tasks is `"done"`, and whether nothing is left to be done; or `"not_halted"`, the family that it
-    is taken for, the command sent last, when that was found, and the kind of the reason with what is told: `"may_not"`;
-    `"undecided"`, the command that was wanted, and families; `"unsaid"`; `"not_sent"` and the error; `"refused"` or
-    `"unanswered"`, the error, how often it was sent (the commands, in how many seconds, and how many seconds ago the
-    unit was heard or None), and a look as of `Looks.look` or the error instead of one; `"unasked"` and the error;
-    `"another"`, what speaks against its name or None, and a kind with what is told of it, which may be `"failed"` and
-    an error; `"port_lost"` and the error; `"unshown"`, the last look, and the frequency in Hz or None; or `"unread"`
-    and the error of the last look.
-    """
+    """One unit that is to be halted: sent until it takes it, and proved."""
 
     def __new__(
         cls,
@@ -873,7 +860,6 @@ class Halt:
         coasts: bool,
         within: float,
         confirm: float,
-        now: float,
         /,
     ) -> Halt:
         """Nothing is sent yet.
@@ -886,16 +872,25 @@ class Halt:
             coasts: Whether each fourth frame is a coast.
             within: Seconds for which it is sent until it is taken.
             confirm: Seconds for which its state is looked at; 0 does not look.
-            now: Seconds on the line's clock.
         """
     def carry_out(self) -> Task:
-        """Does all of it. One task at a time; RuntimeError otherwise."""
-    def advance(self) -> Task:
-        """Does the next thing of it: sends, asks what the unit is, or looks."""
-    def pause(self, now: float, /) -> float:
-        """Seconds until there is something to do again."""
-    def wait(self, seconds: float, /) -> None:
-        """For *seconds* others were seen to: its proof does not count them."""
+        """Halts it. The result is `"done"` and nothing, or `"not_halted"` and why.
+
+        That is the family that it is taken for, the command sent last, when that was found, and the kind of the reason
+        with what is told: `"may_not"`; `"undecided"`, the command that was wanted, and families; `"unsaid"`;
+        `"not_sent"` and the error; `"refused"` or `"unanswered"`, the error, how often it was sent (the commands, in
+        how many seconds, and how many seconds ago the unit was heard or None), and a look as of `Looks.look` or the
+        error instead of one; `"unasked"` and the error; `"another"`, what speaks against its name or None, and a kind
+        with what is told of it, which may be `"failed"` and an error; `"port_lost"` and the error; `"unshown"`, the
+        last look, and the frequency in Hz or None; or `"unread"` and the error of the last look.
+        """
+
+def halt_all(halts: Sequence[Halt], /) -> Task:
+    """Halts units that hang on one line, side by side.
+
+    The result is what `Halt.carry_out` comes to for each, in their order. A kind may be `"failed"`, too, with an error
+    that says nothing of the unit.
+    """
 
 def begin_families() -> None:
     """Begins to work out the shipped families, which a drive needs, in a thread that ends by itself."""

@@ -279,7 +279,7 @@ impl Unit {
     /// [`NotGivenBack::Unseen`] and [`NotGivenBack::Failed`]: the drive was only asked.
     pub async fn comes_to_rest<E: LineError>(&self, line: &Mailbox<E>) -> Result<bool, NotGivenBack<E>> {
         self.rule().state().map_err(|why| NotGivenBack::Unseen(why.to_string()))?;
-        let family_line = line.taken_for(self.family());
+        let family_line = line.taken_for(self.address(), self.family());
         let (mut lowest, mut deadline) = (f64::INFINITY, line.now());
         loop {
             let state = self.state(line).await.map_err(NotGivenBack::Failed)?;

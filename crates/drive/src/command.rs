@@ -186,7 +186,7 @@ impl Unit {
         // Who started it so must not be kept from stopping it.
         self.record().note(|sent| sent.started_unverified |= is_unverified);
         // Before it is sent: whoever is interrupted from here on has to end it.
-        line.taken_for(self.family()).tell(Notice::Starts(command)).await;
+        line.taken_for(self.address(), self.family()).tell(Notice::Starts(command)).await;
         self.record().note(|sent| {
             sent.starts += 1;
             sent.started_as = Some(if start.jogs { State::Unknown } else { wanted });

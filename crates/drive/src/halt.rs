@@ -9,6 +9,7 @@
 
 mod not_halted;
 mod proof;
+mod several;
 mod vouching;
 
 use std::sync::Arc;
@@ -18,12 +19,12 @@ use drivebus_drives::Command;
 use drivebus_rtu::{Instant, Meaning};
 
 pub use not_halted::{After, LastLook, NotHalted, Tries, Why};
+pub use several::halt_all;
 
 use crate::aim::{ANSWER_WITHIN, Aim, NotTaken, Target};
 use crate::asked::NotTold;
 use crate::families::Families;
 use crate::huanyang::may_be_of;
-use crate::look::POLL_INTERVAL;
 use crate::record::Record;
 use crate::taken::Taken;
 use crate::task::{Cause, LineError, Mailbox, Notice, Payload, Write};
@@ -130,32 +131,6 @@ impl<E: LineError> Halt<E> {
         }
     }
 
-    /// Does the next thing of it: sends, asks what the unit is, or looks. Whether nothing is left to be done.
-    ///
-    /// For who halts several units over one line in turns.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`carry_out`](Self::carry_out).
-    pub async fn advance(&mut self, line: &Mailbox<E>, families: &Families) -> Result<bool, NotHalted<E>> {
-        match self.next(line, families).await {
-            Ok(is_done) => Ok(is_done),
-            Err(why) => Err(self.not_halted(line, why)),
-        }
-    }
-
-    /// Time until there is something to do again.
-    pub fn pause(&self, now: Instant) -> Duration {
-        self.proof.as_ref().map_or(POLL_INTERVAL, |proof| proof.pause(now))
-    }
-
-    /// For `time` others were seen to: its proof does not count that.
-    pub fn wait(&mut self, time: Duration) {
-        if let Some(proof) = &mut self.proof {
-            proof.wait(time);
-        }
-    }
-
     async fn until_proved(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {
         self.check_order()?;
         self.until_taken(line, families).await?;
@@ -185,37 +160,6 @@ impl<E: LineError> Halt<E> {
                 Err(why) => return Err(why),
             }
         }
-    }
-
-    async fn next(&mut self, line: &Mailbox<E>, families: &Families) -> Result<bool, Why<E>> {
-        if let Some(mut proof) = self.proof.take() {
-            let looked = proof.look(line, &self.unit, &self.record).await;
-            self.looked = line.now();
-            match looked {
-                Ok(false) => {
-                    self.proof = Some(proof);
-                    return Ok(false);
-                }
-                Ok(true) if self.order.confirm.is_zero() || !self.was_another(line, families).await? => {
-                    return Ok(true);
-                }
-                Ok(true) => {}
-                Err(why) => {
-                    if !why.is_unproved() || self.vouch_anew(line, families).await? != Anew::Another {
-                        return Err(why);
-                    }
-                }
-            }
-        }
-        if self.is_taken {
-            self.proof = Some(self.prove(line, families).await?);
-            return Ok(false);
-        }
-        self.check_order()?;
-        if !self.step(line, families).await? && self.is_over(line) {
-            return Err(self.failure(line).await);
-        }
-        Ok(false)
     }
 
     /// Whether its time has passed. A unit that speaks, and did not say yet what it is, is given the time to.
@@ -306,8 +250,8 @@ impl<E: LineError> Halt<E> {
     }
 
     async fn send(&mut self, line: &Mailbox<E>) -> Result<(), E> {
-        let family = self.unit.same().family();
-        let line = &line.taken_for(family);
+        let (address, family) = (self.unit.same().unit(), self.unit.same().family());
+        let line = &line.taken_for(address, family);
         self.record.note(|sent| sent.halts_begun += 1);
         self.told.push(self.command);
         (self.sent, self.connection) = (line.now(), line.connection());
@@ -323,7 +267,7 @@ impl<E: LineError> Halt<E> {
                 timeout: Some(ANSWER_WITHIN),
                 // Behind a port that was opened again another drive may be, which has to say what it is.
                 connection: Some(self.connection),
-                ..Write::new(self.unit.same().unit(), place, payload)
+                ..Write::new(address, place, payload)
             };
             let Err(error) = line.write(write).await else {
                 self.was_sent = true;

@@ -33,7 +33,7 @@
 //! knows whether it proves that the motor obeys.
 //!
 //! What takes several questions is an operation, driven by hand as a [`Task`](task::Task): [`identify()`], [`SameUnit`],
-//! [`Aim`], and [`Halt`], which stops a motor and proves it.
+//! [`Aim`], and [`Halt`], which stops a motor and proves it; [`halt_all`] those of several units.
 //!
 //! # Rooms
 //!
@@ -55,7 +55,7 @@
 //! | `huanyang` | frames of another protocol on the same wires, and what may be an answer |
 //! | `aim` | as what a unit is halted, and whether a word may be sent to it |
 //! | `record` | what was sent to a unit, and what it said of itself |
-//! | `halt` | a halt: sent until the unit takes it, and proved |
+//! | `halt` | a halt: sent until the unit takes it, and proved; and those of several units, side by side |
 //! | `planned` | the words of a read plan, one span after the other |
 //! | `look` | what the status words of a drive say |
 //! | `speed` | how fast a motor turns, and how its drive slows it down |
@@ -134,7 +134,7 @@ pub use families::Families;
 pub use family::{Family, HALTS};
 pub use given::NotGiven;
 pub use guard::Forbidden;
-pub use halt::{After, Halt, LastLook, NotHalted, Order, Tries, Why};
+pub use halt::{After, Halt, LastLook, NotHalted, Order, Tries, Why, halt_all};
 pub use harm::What;
 pub use identify::{Certainty, Identification, Reason, identify};
 pub use look::{Look, Looks};

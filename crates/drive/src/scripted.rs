@@ -250,6 +250,12 @@ pub(crate) struct Script {
     pub(crate) sent: Vec<(Instant, Write)>,
     pub(crate) told: Vec<Notice>,
     pub(crate) link: Link,
+    /// How well these units could be reached, otherwise than `link` has it.
+    pub(crate) links: BTreeMap<UnitAddress, Link>,
+    /// How much longer a request takes that no answer comes to.
+    pub(crate) silence: Duration,
+    /// What becomes of a pause.
+    pub(crate) pauses: Result<(), Fault>,
     /// How often the unit was told to halt.
     pub(crate) halts: u64,
 }
@@ -257,7 +263,19 @@ pub(crate) struct Script {
 impl Script {
     pub(crate) fn new() -> Self {
         let (asked, sent, told) = (Vec::new(), Vec::new(), Vec::new());
-        Self { now: Instant::ZERO, connection: 0, is_closed: false, asked, sent, told, link: Link::default(), halts: 0 }
+        Self {
+            now: Instant::ZERO,
+            connection: 0,
+            is_closed: false,
+            asked,
+            sent,
+            told,
+            link: Link::default(),
+            links: BTreeMap::new(),
+            silence: Duration::ZERO,
+            pauses: Ok(()),
+            halts: 0,
+        }
     }
 
     /// What the operation comes to where `unit` is asked, for each word of a read. Each request takes a millisecond; none is
@@ -284,17 +302,20 @@ impl Script {
         loop {
             let connection = self.connection + unit.reopened();
             let seen = Seen { now: self.now, connection, is_closed: self.is_closed };
-            outcome = match task.step(seen, outcome).unwrap() {
+            let step = task.step(seen, outcome).unwrap();
+            let taken_for = task.taken_for().map(|(unit, _)| unit);
+            outcome = match step {
                 Step::Done(done) => return done,
                 Step::Wish(Wish::Read(read)) => {
                     self.asked.push(read);
+                    assert!(taken_for.is_none_or(|unit| unit == read.unit), "another unit is meant");
                     assert!(self.asked.len() < 4000, "it asks without end");
                     let asked = self.now;
                     self.now = self.now + Duration::from_millis(1);
                     let places = (read.place.address..=u16::MAX).take(read.count.into());
                     let word = |address| unit.read(Read { place: Place { address, ..read.place }, ..read }, self.now);
                     Some(match places.map(word).collect() {
-                        Err(fault) => Outcome::Failed(fault),
+                        Err(fault) => self.failed(fault),
                         Ok(words) if read.is_stamped => Outcome::Stamped(Stamped {
                             words,
                             asked: since_start(asked),
@@ -305,23 +326,32 @@ impl Script {
                 }
                 Step::Wish(Wish::Write(write)) => {
                     self.now = self.now + Duration::from_millis(1);
+                    assert!(taken_for.is_none_or(|unit| unit == write.unit), "another unit is meant");
                     let came = unit.write(&write, self.now);
                     self.sent.push((self.now, write));
                     assert!(self.sent.len() < 1000, "it sends without end");
-                    Some(came.map_or_else(Outcome::Failed, |()| Outcome::Written))
+                    Some(came.map_or_else(|fault| self.failed(fault), |()| Outcome::Written))
                 }
                 Step::Wish(Wish::Sleep(time)) => {
                     self.now = self.now + time;
-                    Some(Outcome::Slept)
+                    Some(self.pauses.clone().map_or_else(Outcome::Failed, |()| Outcome::Slept))
                 }
-                Step::Wish(Wish::Link(_)) => Some(Outcome::Link(self.link)),
+                Step::Wish(Wish::Link(unit)) => Some(Outcome::Link(*self.links.get(&unit).unwrap_or(&self.link))),
                 Step::Wish(Wish::Halts(_)) => Some(Outcome::Halts(Some(self.halts))),
                 Step::Wish(Wish::Tell(notice)) => {
+                    assert!(taken_for.is_some(), "nobody knows of whom {notice:?} is");
                     self.told.push(notice);
                     Some(Outcome::Heard)
                 }
             };
         }
+    }
+
+    fn failed(&mut self, fault: Fault) -> Outcome<Fault> {
+        if fault.cause == Cause::NoAnswer {
+            self.now = self.now + self.silence;
+        }
+        Outcome::Failed(fault)
     }
 
     /// Where was written to, and which words, in their order.

@@ -85,7 +85,7 @@ impl Unit {
         self.rule().read(entry).map_err(|why| unreadable(why.to_string()))?;
         let place = profile.read_address(entry).map_err(|why| unreadable(why.to_string()))?;
         let read = Read::words(self.address(), place, entry.words());
-        let words = line.taken_for(self.family()).read(read).await.map_err(NotSettled::Failed)?;
+        let words = line.taken_for(self.address(), self.family()).read(read).await.map_err(NotSettled::Failed)?;
         let raw = number(entry, &words);
         let told = rule.choices.iter().find(|(_, choice)| u32::from(choice.word) == raw);
         told.map(|(name, _)| name.clone()).ok_or_else(|| NotSettled::Unknown {

@@ -78,8 +78,9 @@ impl Taken {
 
     /// Looks at it, before all who wait where that `is_urgent`, and tells what was seen.
     pub(crate) async fn look<E>(&self, line: &Mailbox<E>, is_urgent: bool) -> Result<Look, E> {
-        let line = line.taken_for(self.same.family());
-        let look = self.looks.look(&line, self.same.unit(), is_urgent).await?;
+        let unit = self.same.unit();
+        let line = line.taken_for(unit, self.same.family());
+        let look = self.looks.look(&line, unit, is_urgent).await?;
         if !self.is_blind() {
             line.tell(Notice::Saw(look.clone())).await;
         }

@@ -92,7 +92,7 @@ pub enum Misuse {
 /// Where an operation puts what it wants done, and finds what came of it.
 pub struct Mailbox<E> {
     desk: Arc<Mutex<Desk<E>>>,
-    family: Option<Arc<Family>>,
+    taken: Option<(UnitAddress, Arc<Family>)>,
 }
 
 /// What lies between an operation and who drives it.
@@ -102,10 +102,10 @@ struct Desk<E> {
     outcome: Option<Outcome<E>>,
 }
 
-/// A wish, and as one of which family its unit is taken.
+/// A wish, of which unit it is, and as one of which family that is taken.
 struct Wished {
     wish: Wish,
-    family: Option<Arc<Family>>,
+    taken: Option<(UnitAddress, Arc<Family>)>,
 }
 
 impl<E> Mailbox<E> {
@@ -124,10 +124,10 @@ impl<E> Mailbox<E> {
         self.desk().seen.is_closed
     }
 
-    /// The same, for what is wished of a unit that is taken for one of `family`: see [`Task::family`].
+    /// The same, for what is wished of `unit`, which is taken for one of `family`: see [`Task::taken_for`].
     #[must_use]
-    pub fn taken_for(&self, family: &Arc<Family>) -> Self {
-        Self { desk: Arc::clone(&self.desk), family: Some(Arc::clone(family)) }
+    pub fn taken_for(&self, unit: UnitAddress, family: &Arc<Family>) -> Self {
+        Self { desk: Arc::clone(&self.desk), taken: Some((unit, Arc::clone(family))) }
     }
 
     /// Reads words.
@@ -202,7 +202,7 @@ impl<E> Mailbox<E> {
     }
 
     async fn wait<T>(&self, wish: Wish, take: impl Fn(Outcome<E>) -> Option<T>) -> T {
-        let mut wish = Some(Wished { wish, family: self.family.clone() });
+        let mut wish = Some(Wished { wish, taken: self.taken.clone() });
         poll_fn(|_| {
             let mut desk = self.desk();
             if let Some(wish) = wish.take() {
@@ -222,7 +222,7 @@ impl<E> Mailbox<E> {
 
 impl<E> Clone for Mailbox<E> {
     fn clone(&self) -> Self {
-        Self { desk: Arc::clone(&self.desk), family: self.family.clone() }
+        Self { desk: Arc::clone(&self.desk), taken: self.taken.clone() }
     }
 }
 
@@ -282,7 +282,7 @@ impl<T, E> Task<T, E> {
     {
         let seen = Seen { now: Instant::ZERO, connection: 0, is_closed: false };
         let desk = Arc::new(Mutex::new(Desk { seen, wish: None, outcome: None }));
-        let mailbox = Mailbox { desk, family: None };
+        let mailbox = Mailbox { desk, taken: None };
         Self { operation: Some(Box::pin(operation(mailbox.clone()))), mailbox, wished: None }
     }
 
@@ -323,10 +323,11 @@ impl<T, E> Task<T, E> {
         self.wished.as_ref().map(|wished| &wished.wish)
     }
 
-    /// As one of which family the unit of that wish is taken, so that a refusal is told in the words of that; `None` where
-    /// nobody says yet what it is, and each answer counts alone.
-    pub fn family(&self) -> Option<&Arc<Family>> {
-        self.wished.as_ref().and_then(|wished| wished.family.as_ref())
+    /// Of which unit that wish is, and as one of which family that is taken, so that a refusal is told in the words of that;
+    /// `None` where nobody says yet what it is, and each answer counts alone. A notice is of a unit always.
+    pub fn taken_for(&self) -> Option<(UnitAddress, &Arc<Family>)> {
+        let (unit, family) = self.wished.as_ref()?.taken.as_ref()?;
+        Some((*unit, family))
     }
 }
 

@@ -120,7 +120,7 @@ impl Unit {
 
     /// Its output frequency in Hz; `None` where it does not tell.
     pub(crate) async fn output<E>(&self, line: &Mailbox<E>) -> Result<Option<f64>, E> {
-        self.speeds().output(&line.taken_for(self.family()), self.address(), false).await
+        self.speeds().output(&line.taken_for(self.address(), self.family()), self.address(), false).await
     }
 
     /// Asks for one word, which tells whether it answers: its state, or else what of it may be read. `false` where nothing may.
@@ -142,13 +142,13 @@ impl Unit {
         // What may be used has an address.
         let Some(place) = self.profile().role("state").and_then(Entry::place) else { return Ok(State::Unknown) };
         let state = self.profile().state(self.word(line, place).await?);
-        line.taken_for(self.family()).tell(Notice::Shows(state)).await;
+        line.taken_for(self.address(), self.family()).tell(Notice::Shows(state)).await;
         Ok(state)
     }
 
     /// The word at `place`.
     pub(crate) async fn word<E>(&self, line: &Mailbox<E>, place: Place) -> Result<u16, E> {
-        let words = line.taken_for(self.family()).read(Read::word(self.address(), place)).await?;
+        let words = line.taken_for(self.address(), self.family()).read(Read::word(self.address(), place)).await?;
         // One is there: a step takes as many words as were asked for.
         Ok(words.first().copied().unwrap_or_default())
     }
@@ -157,7 +157,8 @@ impl Unit {
     pub(crate) async fn values<E>(&self, line: &Mailbox<E>, entries: &[&Entry]) -> Result<Vec<Value>, E> {
         // What may be read has an address.
         let Ok(plan) = self.profile().compile(entries) else { return Ok(Vec::new()) };
-        let came = read_planned(Some(&plan), &line.taken_for(self.family()), self.address(), false).await?;
+        let came =
+            read_planned(Some(&plan), &line.taken_for(self.address(), self.family()), self.address(), false).await?;
         Ok(plan.values(&came.words).filter_map(|(_, value)| value).collect())
     }
 }

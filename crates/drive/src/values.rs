@@ -65,7 +65,7 @@ impl Unit {
         // They have names, and what may be read can be.
         let entries: Vec<_> = names.iter().filter_map(|name| profile.resolve(name).ok()).collect();
         let plan = profile.compile(&entries.iter().map(AsRef::as_ref).collect::<Vec<_>>()).ok();
-        let line = line.taken_for(self.family());
+        let line = line.taken_for(self.address(), self.family());
         let came = read_planned(plan.as_ref(), &line, self.address(), false).await.map_err(NotRead::Failed)?;
         let values = plan.iter().flat_map(|plan| plan.values(&came.words)).filter_map(|(_, value)| value).collect();
         Ok(Values { values, profile: Arc::clone(profile), asked: came.asked, answered: came.answered })

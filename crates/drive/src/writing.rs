@@ -138,7 +138,7 @@ impl Unit {
             is_forced: words.is_forced,
             ..Write::new(self.address(), words.place, words.payload.clone().as_written(self.profile()))
         };
-        if let Err(error) = line.taken_for(self.family()).write(write).await {
+        if let Err(error) = line.taken_for(self.address(), self.family()).write(write).await {
             match error.cause() {
                 // Where the words can be read, the bus has looked whether they are there.
                 Cause::Refused(code, _) if self.family().meaning_of(code) == Meaning::Taken => {}

@@ -19,6 +19,7 @@
 mod asked;
 mod bus;
 mod drive;
+mod halt_all;
 mod poll;
 mod running;
 mod slot;

@@ -23,7 +23,7 @@
 //! reached so well that its stop would be. [`Drive::run`] has the list, [`Drive::control`] tells how a drive is set, and
 //! [`Drive::prepare`] sets it. [`Drive::write`] writes values by name, parameters to RAM so that no EEPROM wears out.
 //! A start is sent once. A halt is sent until the drive takes it, before all that wait for the line, and returns when the
-//! drive shows it.
+//! drive shows it; [`Bus::halt_all`] halts several drives side by side. [`Drive::wait_for_speed`] waits for a motor.
 //!
 //! The bus is safe from any thread, takes no answer for another's, and repeats only what may be repeated. A [`Reading`] brings
 //! values by name in the fewest reads, and [`Bus::poll`] again and again.
@@ -76,6 +76,7 @@ mod checks;
 mod driving;
 mod error;
 mod given;
+mod halt_all;
 mod halting;
 mod named;
 mod not_armed;
@@ -99,6 +100,7 @@ pub use builder::Builder;
 pub use bus::Bus;
 pub use driving::Drive;
 pub use error::Error;
+pub use halt_all::NotAllHalted;
 pub use halting::Halting;
 pub use options::CallOptions;
 pub use payload::Payload;

@@ -1,5 +1,6 @@
 //! A unit as a program named it, and what may be done with it: operations of the core, for who waits and for who awaits.
 
+mod halts;
 mod waits;
 
 use std::sync::Arc;
@@ -12,6 +13,8 @@ use drivebus_drive::{
 };
 use drivebus_drives::{Command, Entry, Fault, Input, OwnedInput, Profile, Setpoint, Store};
 use drivebus_rtu::UnitAddress;
+
+pub(crate) use halts::Each;
 
 use crate::checks;
 use crate::error::Error;
@@ -181,7 +184,7 @@ impl Named {
             let settled = settled.map_err(|why| named.tell("values", why.into()))?;
             let is_as_planned = Arc::ptr_eq(settled.profile(), named.profile());
             let reading = if is_as_planned { planned } else { named.reading(settled.profile(), &asked)? };
-            let line = line.taken_for(&named.family);
+            let line = line.taken_for(named.address, &named.family);
             let mut words = Vec::with_capacity(reading.words());
             for (place, count) in reading.spans() {
                 words.extend(line.read(Read::words(named.address, place, count)).await?);
@@ -244,7 +247,7 @@ impl Named {
     }
 
     async fn looked(&self, line: &Mailbox<Error>) -> Result<Look, Error> {
-        self.looks.look(&line.taken_for(&self.family), self.address, false).await
+        self.looks.look(&line.taken_for(self.address, &self.family), self.address, false).await
     }
 
     /// In Hz, so that a family whose unit nobody knows, or is another one, tells nothing.
@@ -262,7 +265,7 @@ impl Named {
         }
         let is_as_named = Arc::ptr_eq(&profile, self.profile());
         let speeds = if is_as_named { &self.speeds } else { &Arc::new(Speeds::new(&profile, self.is_unverified)) };
-        speeds.frequencies(&line.taken_for(&self.family), self.address, false).await
+        speeds.frequencies(&line.taken_for(self.address, &self.family), self.address, false).await
     }
 
     async fn ended(&self, line: &Mailbox<Error>, command: Command) -> Result<(), NotHalted<Error>> {
@@ -287,12 +290,15 @@ impl Named {
     }
 
     async fn halted(&self, line: &Mailbox<Error>, order: Order) -> Result<(), NotHalted<Error>> {
+        self.halt_by(line, &order).carry_out(line, Families::shipped()).await
+    }
+
+    /// Its halt as `order` says, of which nothing is sent yet.
+    fn halt_by(&self, line: &Mailbox<Error>, order: &Order) -> Halt<Error> {
         let named = self.to_halt_by(order.command);
         let can_coast = || named.rule().command(Command::Coast).is_ok();
-        let order = Order { coasts: order.coasts && can_coast(), ..order };
-        let taken = named.taken(line);
-        let mut halt = Halt::new(taken, &named.record, order, Families::shipped(), line.now());
-        halt.carry_out(line, Families::shipped()).await
+        let order = Order { coasts: order.coasts && can_coast(), ..order.clone() };
+        Halt::new(named.taken(line), &named.record, order, Families::shipped(), line.now())
     }
 
     /// The same; where a start was forced on what no document proves, as this halt is, with the same trust.

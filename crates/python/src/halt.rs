@@ -1,34 +1,32 @@
 //! `Halt` for Python: a halt that is sent until the unit takes it, and proved; why not, as a kind and what Python words.
 
-use std::sync::{Arc, Mutex, PoisonError};
-
 use drivebus_drive::task::Mailbox;
-use drivebus_drive::{self as drive, Families, NotHalted, Order, Tries, Why};
+use drivebus_drive::{self as drive, Families, NotHalted, Order, Taken, Tries, Why};
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-use crate::clock::{duration, moment, to_seconds};
+use crate::clock::{duration, to_seconds};
 use crate::errors::refuse;
 use crate::family::{against, names};
 use crate::look::Looks;
 use crate::not_done::{after as after_of, last_look};
 use crate::record::Record;
 use crate::same_unit::SameUnit;
-use crate::task::{Failed, Task, unknown};
-
-type Core = drive::Halt<Failed>;
+use crate::task::{Failed, Task, is_done, or_why, unknown};
 
 /// One unit that is to be halted; see `python/drivebus/_native.pyi`.
 #[pyclass(name = "Halt", frozen, module = "drivebus._native")]
-#[derive(Debug)]
-pub(crate) struct Halt(Arc<Mutex<Option<Core>>>);
+#[derive(Debug, Clone)]
+pub(crate) struct Halt {
+    unit: Taken,
+    record: drive::Record,
+    order: Order,
+}
 
 #[pymethods]
 impl Halt {
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "one call from one place, with names there")]
-    #[pyo3(signature = (unit, looks, record, command, coasts, within, confirm, now, /))]
+    #[pyo3(signature = (unit, looks, record, command, coasts, within, confirm, /))]
     fn new(
         unit: &SameUnit,
         looks: &Looks,
@@ -37,75 +35,50 @@ impl Halt {
         coasts: bool,
         within: f64,
         confirm: f64,
-        now: f64,
     ) -> PyResult<Self> {
         let command = command.parse().map_err(refuse)?;
         let order = Order { command, coasts, within: duration(within), confirm: duration(confirm) };
         let unit = looks.taken(drive::SameUnit::clone(&unit.core()));
-        let halt = Core::new(unit, &record.0, order, Families::shipped(), moment(now));
-        Ok(Self(Arc::new(Mutex::new(Some(halt)))))
+        Ok(Self { unit, record: record.0.clone(), order })
     }
 
     fn carry_out(&self) -> Task {
-        self.task(|mut halt, line| async move {
-            let done = halt.carry_out(&line, Families::shipped()).await;
-            (halt, done.map(|()| true))
-        })
-    }
-
-    fn advance(&self) -> Task {
-        self.task(|mut halt, line| async move {
-            let done = halt.advance(&line, Families::shipped()).await;
-            (halt, done)
-        })
-    }
-
-    #[pyo3(signature = (now, /))]
-    fn pause(&self, now: f64) -> PyResult<f64> {
-        self.with(|halt| halt.pause(moment(now)).as_secs_f64())
-    }
-
-    #[pyo3(signature = (seconds, /))]
-    fn wait(&self, seconds: f64) -> PyResult<()> {
-        self.with(|halt| halt.wait(duration(seconds)))
+        let halt = self.clone();
+        Task::of(
+            |line| async move { halt.begun(&line).carry_out(&line, Families::shipped()).await },
+            or_why(|py, error: NotHalted<Failed>| match error {
+                NotHalted { why: Why::Failed(error), .. } => Err(error.into()),
+                error => not_halted(py, error),
+            }),
+        )
     }
 }
 
 impl Halt {
-    /// A step, for which the halt is taken out of here, and put back where it comes to its end.
-    fn task<F>(&self, step: impl FnOnce(Core, Mailbox<Failed>) -> F + Send + 'static) -> Task
-    where
-        F: Future<Output = (Core, Result<bool, NotHalted<Failed>>)> + Send + 'static,
-    {
-        let place = Arc::clone(&self.0);
-        let operation = |line| async move {
-            let halt = place.lock().unwrap_or_else(PoisonError::into_inner).take().ok_or_else(under_way)?;
-            let (halt, done) = step(halt, line).await;
-            *place.lock().unwrap_or_else(PoisonError::into_inner) = Some(halt);
-            Ok(done)
-        };
-        Task::of(operation, |py, done: PyResult<_>| match done? {
-            Ok(is_done) => ("done", is_done).into_py_any(py),
-            Err(error) => not_halted(py, error),
-        })
-    }
-
-    fn with<T>(&self, f: impl FnOnce(&mut Core) -> T) -> PyResult<T> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).as_mut().map(f).ok_or_else(under_way)
+    fn begun(&self, line: &Mailbox<Failed>) -> drive::Halt<Failed> {
+        drive::Halt::new(self.unit.clone(), &self.record, self.order.clone(), Families::shipped(), line.now())
     }
 }
 
-fn under_way() -> PyErr {
-    PyRuntimeError::new_err("a step of this halt is under way, or was given up")
+/// Halts several units side by side; see `python/drivebus/_native.pyi`.
+#[pyfunction]
+#[pyo3(signature = (halts, /))]
+pub(crate) fn halt_all(halts: Vec<PyRef<'_, Halt>>) -> Task {
+    let halts: Vec<Halt> = halts.into_iter().map(|halt| Halt::clone(&halt)).collect();
+    let operation = |line| async move {
+        let halts = halts.iter().map(|halt| halt.begun(&line)).collect();
+        drive::halt_all(&line, Families::shipped(), halts).await
+    };
+    Task::of(operation, |py, done: Vec<_>| {
+        let each = |came: Result<(), _>| came.map_or_else(|error| not_halted(py, error), |()| is_done(py, ()));
+        done.into_iter().map(each).collect::<PyResult<Vec<_>>>()?.into_py_any(py)
+    })
 }
 
 /// As what the unit is taken, what was sent, and of which kind the reason is, with what of it Python words.
 fn not_halted(py: Python<'_>, error: NotHalted<Failed>) -> PyResult<Py<PyAny>> {
     let NotHalted { family, command, found, why, .. } = error;
-    let (kind, told) = match why {
-        Why::Failed(error) => return Err(error.into()),
-        why => told_of(py, why)?,
-    };
+    let (kind, told) = told_of(py, why)?;
     ("not_halted", (family.name(), command.name(), to_seconds(found), kind, told)).into_py_any(py)
 }
 

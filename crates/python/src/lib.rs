@@ -55,8 +55,6 @@ mod _native {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::aim::goes_out_at_once;
-    #[pymodule_export]
     use crate::bus::Bus;
     #[pymodule_export]
     use crate::bus_timeout::BusTimeout;
@@ -76,7 +74,7 @@ mod _native {
     #[pymodule_export]
     use crate::guard::{commanded_at, forbidden};
     #[pymodule_export]
-    use crate::halt::Halt;
+    use crate::halt::{Halt, halt_all};
     #[pymodule_export]
     use crate::identify::{identify, usable};
     #[pymodule_export]

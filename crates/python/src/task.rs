@@ -156,8 +156,8 @@ impl Task {
     }
 
     #[getter]
-    fn family(&self) -> PyResult<Option<String>> {
-        Ok(self.held()?.0.family().map(|family| family.name().to_owned()))
+    fn taken_for(&self) -> PyResult<Option<(u8, String)>> {
+        Ok(self.held()?.0.taken_for().map(|(unit, family)| (unit.get(), family.name().to_owned())))
     }
 }
 

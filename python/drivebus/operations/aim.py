@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from drivebus import _native
 from drivebus.advice import Text, argument
 from drivebus.errors import LINE_ERRORS, DrivebusError, NotAllowed, WrongDrive
 from drivebus.identify.families import asked_as, one_of
@@ -21,20 +20,7 @@ from drivebus.identify.refusals import busy
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
 
-__all__ = ["goes_out_at_once", "harmed", "profiles_of", "undecided"]
-
-
-def goes_out_at_once(unit: DriveView, what: str | int) -> bool:
-    """Whether nothing is asked before *what*: the line has identified the unit, or it harms no family.
-
-    Where a name is said to be meant, only what the unit itself shows counts for a command. What speaks against a name
-    is known of the shipped families alone: a unit of somebody's own one has to show it.
-
-    Args:
-        unit: The unit, as it was named.
-        what: A command, or a place that any word may be written to.
-    """
-    return _native.goes_out_at_once(_seen(unit), what, unit.bus.reconnects)
+__all__ = ["harmed", "profiles_of", "undecided"]
 
 
 def harmed(unit: DriveView, kind: str, told: Any) -> DrivebusError:
@@ -58,10 +44,6 @@ def harmed(unit: DriveView, kind: str, told: Any) -> DrivebusError:
     )
     unsaid.__cause__ = error
     return unsaid
-
-
-def _seen(unit: DriveView) -> _native.SameUnit:
-    return unit.identity.seen_as(unit.profile)
 
 
 def profiles_of(unit: DriveView, names: Iterable[str]) -> tuple[Profile, ...]:

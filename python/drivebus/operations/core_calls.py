@@ -35,7 +35,7 @@ async def call_core(unit: DriveView, wanted: Callable[[_native.Unit], _native.Ta
     task = wanted(core)
 
     def around() -> AbstractContextManager[None]:
-        return nullcontext() if task.family is None else explained(unit)
+        return nullcontext() if task.taken_for is None else explained(unit)
 
     def hears(kind: str, told: Any) -> None:
         hear(unit, kind, told)

@@ -5,10 +5,12 @@ What is sent, and what proves it, is decided in the core (`crates/drive`); here 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from drivebus import _native
+from drivebus.errors import DrivebusError
 from drivebus.line.tasks import carried_out
 from drivebus.operations import glances
 from drivebus.operations.core_calls import hear
@@ -17,7 +19,7 @@ from drivebus.operations.explained import explained
 from drivebus.operations.not_halted import in_words
 from drivebus.profile import Profile
 
-__all__ = ["WITHIN", "Halt"]
+__all__ = ["WITHIN", "Halt", "halt_all"]
 
 WITHIN = _native.HALT_WITHIN
 """Seconds for which a halt is sent that is not taken."""
@@ -35,11 +37,11 @@ class Halt:
     """
 
     def __init__(self, unit: DriveView, command: str, confirm: float, within: float, *, coasts: bool = False) -> None:
-        self._unit = unit
+        self.unit = unit
         self._taken_for: dict[str, DriveView] = {unit.profile.name: unit}
         looks = glances.planned(unit.evidence).looks
         same, sent = unit.identity.seen_as(unit.profile), unit.record.sent
-        self._halt = _native.Halt(same, looks, sent, command, coasts, within, confirm, unit.bus.now())
+        self.core = _native.Halt(same, looks, sent, command, coasts, within, confirm)
 
     async def carry_out(self) -> None:
         """Does all of it.
@@ -49,42 +51,44 @@ class Halt:
             Refused, NoAnswer, BadAnswer, PortError: Nothing was taken within the time.
             Unconfirmed: It went out, and is not proved: the motor may still turn.
         """
-        await self._done(self._halt.carry_out())
+        kind, told = await _done(self.core.carry_out(), [self])
+        if kind != "done":
+            raise self.failure(*told)
 
-    async def advance(self) -> bool:
-        """Does the next thing of it: sends, asks what the unit is, or looks. Whether nothing is left to be done.
+    def failure(self, family: str, *reason: Any) -> DrivebusError:
+        """Why the unit, taken for one of *family*, is not known to be halted."""
+        return in_words(self.unit, self.taken_for(family), *reason)
 
-        Raises:
-            NotAllowed, Refused, NoAnswer, BadAnswer, PortError, Unconfirmed: As for `carry_out`.
-        """
-        return await self._done(self._halt.advance())
-
-    @property
-    def pause(self) -> float:
-        """Seconds until there is something to do again."""
-        return self._halt.pause(self._unit.bus.now())
-
-    def wait(self, seconds: float) -> None:
-        """For *seconds* others were seen to: its proof does not count them."""
-        self._halt.wait(seconds)
-
-    async def _done(self, task: _native.Task) -> bool:
-        def around() -> AbstractContextManager[None]:
-            return nullcontext() if task.family is None else explained(self._as(task.family))
-
-        def hears(kind: str, told: Any) -> None:
-            unit = self._unit if task.family is None else self._as(task.family)
-            hear(unit, kind, told)
-
-        kind, told = await carried_out(task, self._unit.bus, around, hears)
-        if kind == "not_halted":
-            family, *reason = told
-            raise in_words(self._unit, self._as(family), *reason)
-        is_done: bool = told
-        return is_done
-
-    def _as(self, family: str) -> DriveView:
+    def taken_for(self, family: str) -> DriveView:
         """The unit as one of *family*: of a name that it shares with a shipped one, the named one is meant."""
         if family not in self._taken_for:
-            self._taken_for[family] = self._unit.taken_for(Profile.builtin(family))
+            self._taken_for[family] = self.unit.taken_for(Profile.builtin(family))
         return self._taken_for[family]
+
+
+async def halt_all(halts: Sequence[Halt]) -> list[DrivebusError | None]:
+    """Carries out *halts* of units on one line, side by side. Of each why it is not known to be halted, or None."""
+    done = await _done(_native.halt_all([halt.core for halt in halts]), halts)
+    return [None if kind == "done" else halt.failure(*told) for halt, (kind, told) in zip(halts, done, strict=True)]
+
+
+async def _done(task: _native.Task, halts: Sequence[Halt]) -> Any:
+    """What *task* of *halts* comes to, in the words of what each unit is taken for."""
+    of_unit = {halt.unit.address: halt for halt in halts}
+
+    def taken() -> DriveView | None:
+        if task.taken_for is None:
+            return None
+        unit, family = task.taken_for
+        return of_unit[unit].taken_for(family)
+
+    def around() -> AbstractContextManager[None]:
+        unit = taken()
+        return nullcontext() if unit is None else explained(unit)
+
+    def hears(kind: str, told: Any) -> None:
+        unit = taken()
+        if unit is not None:
+            hear(unit, kind, told)
+
+    return await carried_out(task, halts[0].unit.bus, around, hears)

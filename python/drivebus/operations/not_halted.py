@@ -29,17 +29,20 @@ def in_words(named: DriveView, unit: DriveView, command: str, found: float, reas
         reason: Of which kind the reason is, as `_native.Halt` has it.
         told: What is told of it.
     """
+    if reason == "failed":
+        failed: DrivebusError = told
+        return failed
     cause = None
-    if reason in ("may_not", "undecided", "failed"):
+    if reason in ("may_not", "undecided"):
         error = _not_sent(named, unit, command, reason, told)
     elif reason == "unsaid":
-        error = _unsaid(unit, command)
+        error = _unsaid(unit, command, found)
     elif reason == "not_sent":
         error, cause = _not_out(unit, command, told), told
     elif reason in ("refused", "unanswered"):
-        error, cause = _not_taken(unit, command, *told), told[0]
+        error, cause = _not_taken(unit, command, found, *told), told[0]
     elif reason == "unasked":
-        error, cause = _unasked(unit, command, told), told
+        error, cause = _unasked(unit, command, told, found), told
     elif reason == "another":
         error, cause = _another(named, unit, command, *told)
     elif reason == "port_lost":
@@ -63,10 +66,10 @@ def _not_sent(named: DriveView, unit: DriveView, command: str, reason: str, told
     return refusal_of(unit.evidence.require_command, command)
 
 
-def _unsaid(unit: DriveView, command: str) -> DrivebusError:
+def _unsaid(unit: DriveView, command: str, found: float) -> DrivebusError:
     return Unconfirmed(
         f"unit {unit.address} is busy, and does not say what it is: {command} was not sent, for it may start "
-        f"a drive of another family; {MAY[command]}, {glances.seen_last(unit)}. If it must stop now, use the "
+        f"a drive of another family; {MAY[command]}, {glances.seen_last(unit, found)}. If it must stop now, use the "
         "emergency stop",
         unit=unit.address,
     )
@@ -84,6 +87,7 @@ def _not_out(unit: DriveView, command: str, error: DrivebusError) -> DrivebusErr
 def _not_taken(
     unit: DriveView,
     command: str,
+    found: float,
     error: DrivebusError,
     sent: tuple[list[str], float, float | None],
     after: Any,
@@ -92,7 +96,7 @@ def _not_taken(
     times = f"{len(told)} times within {took:.1f} s" if len(told) != 1 else "once"
     was_sent = f"{_each_once(told)} was sent to unit {unit.address} {times}"
     shown = after if isinstance(after, Exception) else glances.shown(unit, after)
-    then = f"{MAY[command]}. {afterwards(unit, shown)}"
+    then = f"{MAY[command]}. {afterwards(unit, shown, found)}"
     if isinstance(error, Refused):
         return Refused(
             f"{was_sent} and not taken, at last: {error}; {then}",
@@ -117,11 +121,11 @@ def _each_once(told: Iterable[str]) -> str:
     return " or ".join(map(said, dict.fromkeys(told)))
 
 
-def _unasked(unit: DriveView, command: str, error: DrivebusError) -> DrivebusError:
+def _unasked(unit: DriveView, command: str, error: DrivebusError, found: float) -> DrivebusError:
     return Unconfirmed(
         f"{said(command)} was sent to unit {unit.address} and taken, and what the unit "
         f"is could not be asked ({error}): by another family it may mean something else; "
-        f"{MAY[command]}; {glances.seen_last(unit)}",
+        f"{MAY[command]}; {glances.seen_last(unit, found)}",
         unit=unit.address,
     )
 

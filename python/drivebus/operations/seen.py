@@ -17,8 +17,11 @@ def frames_of(error: DrivebusError) -> dict[str, Any]:
     return {"request": error.request, "raw": error.raw, "started": error.started, "ended": error.ended}
 
 
-def afterwards(unit: DriveView, seen: Look | Exception) -> str:
-    """What *unit* is *seen* to do after a command of which nothing is known, in words; or why it is not."""
+def afterwards(unit: DriveView, seen: Look | Exception, found: float | None = None) -> str:
+    """What *unit* is *seen* to do after a command of which nothing is known, in words; or why it is not.
+
+    That was *found* just now, or at this moment of the line's clock.
+    """
     if isinstance(seen, Look):
         return f"State seen afterwards: {seen}"
-    return f"Its state could not be read afterwards either ({type(seen).__name__}); {glances.seen_last(unit)}"
+    return f"Its state could not be read afterwards either ({type(seen).__name__}); {glances.seen_last(unit, found)}"

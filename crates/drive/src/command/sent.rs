@@ -72,7 +72,7 @@ impl Unit {
         } else {
             self.send_moving(line, families, &command_words).await?;
         }
-        line.taken_for(self.family()).tell(Notice::Took(command)).await;
+        line.taken_for(self.address(), self.family()).tell(Notice::Took(command)).await;
         Ok(())
     }
 

@@ -100,8 +100,8 @@ impl Proof {
         unit: &Taken,
         record: &Record,
     ) -> Result<bool, E> {
-        let line = &line.taken_for(unit.same().family());
         let (speeds, address) = (unit.speeds(), unit.same().unit());
+        let line = &line.taken_for(address, unit.same().family());
         let asked = line.now();
         let turns = speeds.turns_in_spite_of(look.state, line, address, true).await?;
         if look.state.is_at_rest() && !turns {

@@ -83,7 +83,7 @@ struct Halted {
     done: Result<(), NotHalted<Fault>>,
 }
 
-fn order(command: Command) -> Order {
+pub(super) fn order(command: Command) -> Order {
     Order { command, coasts: false, within: Duration::from_secs(2), confirm: Duration::from_secs(1) }
 }
 
@@ -336,37 +336,18 @@ impl<F: FnMut(Read) -> Reply> Unit for Mute<F> {
     }
 }
 
-/// Units in turns: what the others took does not count.
-#[test]
-fn a_halt_goes_on_by_steps() {
-    let record = Record::default();
-    let (mut halt, mut script) = (of(&shipped("gd350"), order(Command::Coast), &record), Script::new());
-    let mut motor = Motor::new(100.0);
-    let (mut is_done, mut steps) = (false, 0);
-    while !is_done {
-        let step = |line| async move {
-            let done = halt.advance(&line, Families::shipped()).await;
-            (halt, done)
-        };
-        (halt, is_done) = {
-            let (halt, done) = script.carry_out_with(&mut motor, step);
-            (halt, done.unwrap())
-        };
-        script.now = script.now + Duration::from_secs(2);
-        halt.wait(Duration::from_secs(2));
-        assert!(halt.pause(script.now) <= Duration::from_millis(100));
-        steps += 1;
-    }
-    assert!(steps > 2);
-    assert_eq!(script.sent.len(), 1);
-}
-
 /// A unit that answers whatever comes next, from the first again behind the last.
-struct Whatever {
+pub(super) struct Whatever {
     replies: Vec<Reply>,
     confirms: Vec<Result<(), Fault>>,
     asked: usize,
     sent: usize,
+}
+
+impl Whatever {
+    pub(super) fn new(replies: Vec<Reply>, confirms: Vec<Result<(), Fault>>) -> Self {
+        Self { replies, confirms, asked: 0, sent: 0 }
+    }
 }
 
 impl Unit for Whatever {
@@ -385,7 +366,7 @@ impl Unit for Whatever {
 fn at_it(family: &str, within: u64, replies: Vec<Reply>) -> Halted {
     let acknowledged = refuses(0x05).map_err(|fault: Fault| Fault { was_sent: false, ..fault });
     let (confirm, within) = (Duration::from_millis(300), Duration::from_millis(within));
-    let unit = Whatever { replies, confirms: vec![acknowledged], asked: 0, sent: 0 };
+    let unit = Whatever::new(replies, vec![acknowledged]);
     halt(&shipped(family), Order { within, confirm, ..order(Command::Stop) }, unit)
 }
 
@@ -422,7 +403,7 @@ fn one_that_is_busy_has_not_said_what_it_is() {
 
 #[test]
 fn what_is_refused_each_time_was_not_taken() {
-    let unit = Whatever { replies: vec![Ok(1)], confirms: vec![refuses(0x04)], asked: 0, sent: 0 };
+    let unit = Whatever::new(vec![Ok(1)], vec![refuses(0x04)]);
     let halted = halt(&shipped("gd350"), Order { within: Duration::from_millis(300), ..order(Command::Stop) }, unit);
     assert!(halted.script.sent.len() > 1);
     let error = halted.done.unwrap_err();
@@ -454,7 +435,7 @@ proptest! {
         let script = Script { is_closed, ..Script::new() };
         let may_act = |fault: &Fault| fault.was_sent() && !fault.cause().is_refusal();
         let went_out = confirms.iter().all(|each| each.as_ref().map_or_else(may_act, |()| true));
-        let unit = Whatever { replies, confirms, asked: 0, sent: 0 };
+        let unit = Whatever::new(replies, confirms);
         let halted = halt_over(script, &family, order, unit);
         let seen = halted.script.told.iter().rev().find_map(|notice| match notice {
             Notice::Saw(look) => Some(look.state),

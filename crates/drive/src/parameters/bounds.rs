@@ -72,7 +72,7 @@ impl Unit {
         let mut values = unit.values(line, &entries).await.map_err(Why::Failed)?.into_iter();
         if let Some(word) = state.and_then(|_| values.next()) {
             let state = profile.state(u16::try_from(word.count() & 0xFFFF).unwrap_or_default());
-            line.taken_for(self.family()).tell(Notice::Shows(state)).await;
+            line.taken_for(self.address(), self.family()).tell(Notice::Shows(state)).await;
             if state.is_running() {
                 let names = only_stopped.iter().map(|item| item.name.to_owned()).collect();
                 return Err(Why::Running { names, state });

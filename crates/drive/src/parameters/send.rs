@@ -62,7 +62,7 @@ impl Unit {
             let times = self.record().stored(item.key());
             if times >= Record::STORES_BEFORE_NOTICE {
                 let name = item.key().to_owned();
-                line.taken_for(self.family()).tell(Notice::Stored { name, times }).await;
+                line.taken_for(self.address(), self.family()).tell(Notice::Stored { name, times }).await;
             }
         }
         Ok(())
@@ -109,6 +109,6 @@ impl Unit {
         // What may be written has an address, and what shares a request fits into one.
         let first = run.first().and_then(|item| item.entry.place());
         let Some((first, count)) = first.zip(u16::try_from(run.len()).ok()) else { return Ok(Vec::new()) };
-        line.taken_for(self.family()).read(Read::words(self.address(), first, count)).await
+        line.taken_for(self.address(), self.family()).read(Read::words(self.address(), first, count)).await
     }
 }

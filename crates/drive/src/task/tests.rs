@@ -1,3 +1,5 @@
+use drivebus_drives::Command;
+
 use super::*;
 
 const UNIT: u8 = 5;
@@ -76,6 +78,25 @@ fn an_operation_sees_the_line_as_it_is_at_each_step() {
     let lost = Seen { connection: 4, is_closed: true, ..at(1) };
     let Ok(Step::Done(seen)) = task.step(lost, Some(Outcome::Slept)) else { panic!() };
     assert_eq!(seen, ((3, false), (4, true)));
+}
+
+#[test]
+fn a_wish_says_of_whom_it_is_and_as_what_that_is_taken() {
+    let families = crate::families::Families::shipped();
+    let named = |name| families.named(name).unwrap();
+    let mut task: Task<_, &str> = Task::new(|line: Mailbox<_>| async move {
+        line.taken_for(UnitAddress::by_name(1), named("gd350")).tell(Notice::Took(Command::Stop)).await;
+        line.taken_for(UnitAddress::by_name(2), named("vfd500")).tell(Notice::Took(Command::Stop)).await;
+        line.sleep(Duration::ZERO).await
+    });
+    let mut outcome = None;
+    for expected in [Some((1, "gd350")), Some((2, "vfd500")), None] {
+        assert!(matches!(task.step(at(0), outcome), Ok(Step::Wish(_))));
+        assert_eq!(task.taken_for().map(|(unit, family)| (unit.get(), family.name())), expected);
+        outcome = Some(Outcome::Heard);
+    }
+    assert!(matches!(task.step(at(0), Some(Outcome::Slept)), Ok(Step::Done(Ok(())))));
+    assert_eq!(task.taken_for().map(|(unit, _)| unit), None);
 }
 
 #[test]

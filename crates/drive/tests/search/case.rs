@@ -145,7 +145,7 @@ impl Case {
             }
             here.clear();
             here.extend(faults.iter().filter(|(at, _)| *at == number).map(|(_, fault)| *fault));
-            let came = world.outcome_of(&wish, task.family(), &here);
+            let came = world.outcome_of(&wish, task.taken_for().map(|(_, family)| family), &here);
             if let Some(trace) = &mut trace {
                 trace.push(format!("{number} {wish} {here:?} -> {came:?}"));
             }
