@@ -96,6 +96,8 @@ impl<E: LineError> Halt<E> {
                     return Ok(true);
                 }
                 Ok(true) => {}
+                // What was only acknowledged may not have been carried out.
+                Err(why) if why.is_unproved() && !self.is_confirmed && !self.is_over(line) => self.is_taken = false,
                 Err(why) => {
                     if !why.is_unproved() || self.vouch_anew(line, families).await? != Anew::Another {
                         return Err(why);

@@ -98,7 +98,7 @@ fn halt_over(mut script: Script, family: &Arc<Family>, order: Order, unit: impl 
     Halted { script, record, done }
 }
 
-fn of(family: &Arc<Family>, order: Order, record: &Record) -> Halt<Fault> {
+pub(super) fn of(family: &Arc<Family>, order: Order, record: &Record) -> Halt<Fault> {
     let same = SameUnit::new(UNIT, family, &Identity::new(0), false);
     let profile = family.profile();
     let unit = Taken::as_named(same, &Arc::new(Looks::new(profile, true)), &Arc::new(Speeds::new(profile, true)));
@@ -156,10 +156,7 @@ fn a_halt_that_is_lost_or_put_off_is_sent_again() {
 #[test]
 fn what_is_only_acknowledged_has_to_show() {
     let family = shipped("sunfar-e300");
-    let acknowledged = |obeys| {
-        let unit = Acknowledges { family: Arc::clone(&family), obeys, was_told: false };
-        halt(&family, order(Command::Stop), unit)
-    };
+    let acknowledged = |obeys| halt(&family, order(Command::Stop), Acknowledges::new(&family, obeys));
     let obeys = acknowledged(true);
     assert!(obeys.done.is_ok());
     assert_eq!(obeys.words().len(), 1);
@@ -169,10 +166,16 @@ fn what_is_only_acknowledged_has_to_show() {
 }
 
 /// It runs, and says of each write that it is at it.
-struct Acknowledges {
+pub(super) struct Acknowledges {
     family: Arc<Family>,
     obeys: bool,
     was_told: bool,
+}
+
+impl Acknowledges {
+    pub(super) fn new(family: &Arc<Family>, obeys: bool) -> Self {
+        Self { family: Arc::clone(family), obeys, was_told: false }
+    }
 }
 
 impl Unit for Acknowledges {

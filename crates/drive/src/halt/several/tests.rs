@@ -4,7 +4,7 @@ use drivebus_drives::{Command, Entry, State};
 use drivebus_rtu::UnitAddress;
 use proptest::prelude::*;
 
-use super::super::tests::{Whatever, order};
+use super::super::tests::{Acknowledges, Whatever, of, order};
 use super::super::{After, Order};
 use super::*;
 use crate::family::Family;
@@ -190,6 +190,18 @@ fn one_that_is_not_halted_keeps_no_other_from_it() {
     assert!(matches!(refuses.why, Why::Refused { .. }), "{refuses}");
     assert!(matches!(runs.why, Why::Unshown(_)), "{runs}");
     assert_eq!(told(&script)[..5], [1, 2, 3, 4, 5], "all are told before one is told again");
+}
+
+/// As where one is halted alone: a drive that says by 05H that it is at it, and shows nothing, is told once more.
+#[test]
+fn what_is_only_acknowledged_has_to_show() {
+    let family = shipped("sunfar-e300");
+    for (obeys, times) in [(true, 1), (false, 2)] {
+        let (mut script, halts) = (Script::new(), vec![of(&family, order(Command::Stop), &Record::default())]);
+        let unit = Acknowledges::new(&family, obeys);
+        let done = script.carry_out(unit, |line| async move { halt_all(&line, Families::shipped(), halts).await });
+        assert_eq!((done[0].is_ok(), script.sent.len()), (obeys, times));
+    }
 }
 
 /// EDS300 manual, p. 46: 5 runs it, and 6 stops it.
