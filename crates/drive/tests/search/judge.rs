@@ -242,7 +242,7 @@ impl Judge {
                 let is_taken = self.lied || matches!(self.case.stands, Stands::AtKeypad(_));
                 let is_believed = !tells && is_taken || is_lie;
                 self.must(drive.is_let_go() || is_believed, || format!("4: halted, it says, and {:?}", drive.runs));
-                let is_told = self.halted || self.lied;
+                let is_told = self.halted || self.lied || is_lie;
                 self.must(is_told, || "4: halted, it says, and was never told".to_owned());
             }
             Done::Halted(Err(error)) => {
