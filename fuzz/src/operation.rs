@@ -15,7 +15,8 @@ use drivebus_drive::task::{
     Cause, LineError, Link, Misuse, Notice, Outcome, Payload, Read, Seen, Stamped, Step, Task, Wish, Write,
 };
 use drivebus_drive::{
-    Families, Family, HALTS, Halt, Identity, Looks, NotHalted, Order, Record, SameUnit, Speeds, Taken, identify,
+    Besides, Families, Family, HALTS, Halt, Identity, Looks, NotHalted, Order, Record, SameUnit, Speeds, Taken,
+    identify,
 };
 use drivebus_drives::{Command, Place, State};
 use drivebus_rtu::{ExceptionCode, Instant, Meaning, UnitAddress};
@@ -78,7 +79,8 @@ pub fn operation(data: &[u8]) {
         1 => drop(line.carry_out(Task::new(async move |line| same.check(&line, families, true, false).await))),
         kind => {
             let command = HALTS[usize::from(kind) % HALTS.len()];
-            let order = Order { command, coasts: kind >= 5, within, confirm };
+            let order =
+                Order { command, besides: if kind >= 5 { Besides::Coast } else { Besides::Nothing }, within, confirm };
             halt(&mut line, named, same, order);
             return;
         }

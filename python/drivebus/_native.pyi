@@ -16,6 +16,8 @@ _T_co = TypeVar("_T_co", covariant=True)
 _Piece: TypeAlias = tuple[str, bytes, float, float, float | None, float, float | None, str | None]
 _Answer: TypeAlias = tuple[int, int | None, int | None]
 _Writable: TypeAlias = tuple[str, int, list[int] | None, str, int | None, str, int | None]
+_Named: TypeAlias = tuple[Profile, Sequence[str], bool, bool]
+"""A profile, the commands that halt, whether its name is trusted, and whether what is not verified is done."""
 
 __version__: Final[str]
 __all__ = [
@@ -383,11 +385,13 @@ class Bus:
         *,
         look: tuple[bytes, Sequence[bytes]] | None = None,
         silence: float = 0.0,
+        named: _Named | None = None,
     ) -> int | None:
         """Leaves what halts *unit* when this program is gone without a word: the number of that will, or None.
 
         None where nobody would find it. *ways* are PDUs that follow each other, each a way to halt; *look* a read and
-        the answers by which the unit says that it is another one; *silence* the drive's own time-out in seconds.
+        the answers by which the unit says that it is another one; *silence* the drive's own time-out in seconds. A
+        unit that is *named* as one of a shipped family is halted by what that knows, and not frame by frame.
         """
     def withdraw_will(self, number: int, /) -> None:
         """Takes that will back."""
@@ -1119,7 +1123,9 @@ class Gateway:
         *,
         rtu: bool,
         rules: list[tuple[list[str], list[int], list[int], list[_Writable]]],
-        units: list[tuple[int, list[_Writable], list[list[bytes]], tuple[bytes, Sequence[bytes]] | None]],
+        units: list[
+            tuple[int, list[_Writable], list[list[bytes]], tuple[bytes, Sequence[bytes]] | None, _Named | None]
+        ],
         dead_man: float | None,
         audit: str | None,
     ) -> Gateway:

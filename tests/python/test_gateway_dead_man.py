@@ -18,6 +18,7 @@ from drivebus import Allow, Bus, Gateway, Simulator
 
 from .conftest import NO_PTY
 from .tcp_client import HERE, answer, connected, request, seen
+from .workshop import Workshop
 
 RUN, STOP, LOOK = b"\x06\x20\x00\x00\x01", b"\x06\x20\x00\x00\x05", b"\x03\x21\x00\x00\x01"
 RUNS = (0x2000, 1)
@@ -150,6 +151,45 @@ def test_a_halt_goes_on_until_the_drive_takes_it() -> None:
         seen(lambda: simulator.drive(1).state == "stopped")
         seen(lambda: any("took the halt" in text for text in gateway.told()))
         assert written(simulator)[1:3] == [(0x2000, 5), (0x2000, 6)]
+
+
+@pytest.mark.parametrize(
+    ("is_now", "by", "shown"),
+    [
+        # What stops a GD350 runs an EDS300 (its manual, p. 44).
+        ("eds300", ["6"], "It shows that it is a ENC EDS300, and was halted as that. Its state proves the halt"),
+        ("coast 03", ["5", "6"], "Its state proves the halt"),
+        ("stuck", ["5"], "It is not proved: it was taken, and the state does not show it: forward"),
+    ],
+)
+def test_what_shows_of_a_halt_is_told(is_now: str, by: list[str], shown: str) -> None:
+    shop = Workshop()
+    try:
+        with (
+            Bus(shop.port, parity="N", timeout=1.0) as bus,
+            Gateway(
+                bus,
+                HERE,
+                answer_within=20.0,
+                allow=[Allow(drives=[bus.drive(1, "gd350")], commands=["run"])],
+                dead_man=60.0,
+            ) as gateway,
+        ):
+            with connected(gateway) as client:
+                assert ask(client, RUN) == RUN
+                since = shop.tell(is_now)
+            told: list[str] = []
+
+            def is_told() -> bool:
+                told.extend(gateway.told())
+                return any("which was halted for" in text for text in told)
+
+            seen(is_told)
+            shop.tell("take")
+        assert shown in told[-1]
+        assert [said.what[-1] for said in shop.frames(since) if said.is_halt] == by
+    finally:
+        shop.close()
 
 
 def test_the_end_of_the_gateway_is_the_end_of_its_clients() -> None:

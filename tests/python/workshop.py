@@ -4,7 +4,8 @@ It keeps its own truth: the motor, and a bus time-out that switches the motor of
 waits for something waits on the pipe. As a program: `python -m tests.python.workshop`, or by its path.
 
 On standard input it is told what to do: `refuse HEX [SECONDS]` answers each halt with this exception, `silent` answers
-no halt, `take` takes them again, `code HEX` is the identification from then on.
+no halt, `coast HEX` answers a stop alone with this exception, `stuck` confirms each halt and runs on, `take` takes them
+again, `code HEX` is the identification from then on. `eds300` puts an EDS300 in its place, which runs if it did.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ __all__ = ["Said", "Workshop"]
 
 CONTROL, STATE, IDENTIFICATION, TIMEOUT = 0x2000, 0x2100, 0x2103, 0x0E04
 RUN, STOP, COAST = 1, 5, 6
+EDS300 = {0x2100, 0x2180, *range(0x1000, 0x100D)}
+"""What an EDS300 answers; by 5 it runs, and by 6 it stops (its manual, pp. 44 and 45)."""
 LIMIT = 20.0
 """Seconds after which a test has failed that waits for something."""
 
@@ -106,6 +109,7 @@ class _Drive:
         self.words: dict[int, int] = {}
         self.code = 0x01A0
         self.runs = False
+        self.is_eds300 = False
         self.heard = time.monotonic()
         self.halts = "take"
         self.refuses_until = float("inf")
@@ -126,6 +130,8 @@ class _Drive:
     def answer(self, pdu: bytes) -> bytes | None:
         self.heard = time.monotonic()
         address, value = struct.unpack(">HH", pdu[1:5])
+        if pdu[0] == 3 and self.is_eds300 and not EDS300.issuperset(range(address, address + value)):
+            return bytes([0x83, 2])
         if pdu[0] == 3:
             return bytes([3, 2 * value]) + b"".join(struct.pack(">H", self.word(address + n)) for n in range(value))
         if pdu[0] == 8:
@@ -133,12 +139,16 @@ class _Drive:
         written = [value] if pdu[0] == 6 else list(struct.unpack(f">{value}H", pdu[6:]))
         if self.heard >= self.refuses_until:
             self.halts = "take"
-        if address == CONTROL and written[0] in (STOP, COAST) and self.halts != "take":
+        is_halt = address == CONTROL and written[0] in (STOP, COAST)
+        is_halt = is_halt and not (self.halts.startswith("coast") and written[0] == COAST)
+        if is_halt and self.halts == "stuck":
+            return pdu
+        if is_halt and self.halts != "take":
             return None if self.halts == "silent" else bytes([pdu[0] | 0x80, int(self.halts.split()[1], 16)])
         for at, word in enumerate(written, address):
             self.words[at & 0x7FFF] = word
             if at == CONTROL and word in (RUN, STOP, COAST):
-                self.turn(word == RUN, f"{word}")
+                self.turn(word in ((STOP,) if self.is_eds300 else (RUN,)), f"{word}")
         return pdu if pdu[0] == 6 else pdu[:5]
 
     def word(self, address: int) -> int:
@@ -163,6 +173,8 @@ def _serve() -> None:
             words = sys.stdin.readline().strip()
             if words.startswith("code"):
                 drive.code = int(words.split()[1], 16)
+            elif words == "eds300":
+                drive.is_eds300 = True
             elif words:
                 drive.halts = words
                 seconds = words.split()[2:]

@@ -43,8 +43,8 @@ const TO_SAY: Duration = Duration::from_secs(2);
 pub struct Order {
     /// What is sent first.
     pub command: Command,
-    /// Whether each fourth frame is a coast, where the ones before were not taken.
-    pub coasts: bool,
+    /// What is sent besides, where that was not taken.
+    pub besides: Besides,
     /// How long it is sent until the unit takes it, an hour at most. A unit that answers, but has not said yet what it is, is
     /// asked for two seconds in any case.
     pub within: Duration,
@@ -57,8 +57,23 @@ impl Order {
     pub const WITHIN: Duration = Duration::from_secs(10);
 
     fn nth(&self, frame: usize) -> Command {
-        if self.coasts && frame % 4 == 3 { Command::Coast } else { self.command }
+        match self.besides {
+            Besides::Coast if frame % 4 == 3 => Command::Coast,
+            Besides::InTurns(other) if frame % 2 == 1 => other,
+            _ => self.command,
+        }
     }
+}
+
+/// What is sent besides a command that was not taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Besides {
+    /// Nothing.
+    Nothing,
+    /// A coast, each fourth frame.
+    Coast,
+    /// This, each second frame.
+    InTurns(Command),
 }
 
 /// One unit that is to be halted.
@@ -129,6 +144,11 @@ impl<E: LineError> Halt<E> {
             Ok(()) => Ok(()),
             Err(why) => Err(self.not_halted(line, why)),
         }
+    }
+
+    /// As what the unit is taken: what it was named as, until it shows that it is another one.
+    pub fn taken_as(&self) -> &Taken {
+        &self.unit
     }
 
     async fn until_proved(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {

@@ -134,7 +134,7 @@ pub use families::Families;
 pub use family::{Family, HALTS};
 pub use given::NotGiven;
 pub use guard::Forbidden;
-pub use halt::{After, Halt, LastLook, NotHalted, Order, Tries, Why, halt_all};
+pub use halt::{After, Besides, Halt, LastLook, NotHalted, Order, Tries, Why, halt_all};
 pub use harm::What;
 pub use identify::{Certainty, Identification, Reason, identify};
 pub use look::{Look, Looks};

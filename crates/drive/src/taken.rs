@@ -63,7 +63,7 @@ impl Taken {
     }
 
     /// Whether the states of its family may be used.
-    pub(crate) fn tells_its_state(&self) -> bool {
+    pub fn tells_its_state(&self) -> bool {
         self.looks.state().is_ok()
     }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drivebus_drive::Order;
+use drivebus_drive::{Besides, Order};
 use drivebus_drives::Command;
 
 use crate::checks;
@@ -47,7 +47,7 @@ impl Halting {
     }
 
     fn by(command: Command) -> Self {
-        Self(Order { command, coasts: false, within: Order::WITHIN, confirm: Self::CONFIRM })
+        Self(Order { command, besides: Besides::Nothing, within: Order::WITHIN, confirm: Self::CONFIRM })
     }
 
     /// For how long it is told until it takes that, 0 to 3600 s. A unit that answers, and has not said yet what it is, is
@@ -67,7 +67,7 @@ impl Halting {
     /// Where it is not taken, it is told to coast each fourth time, if its family may be.
     #[must_use]
     pub fn or_coast(self) -> Self {
-        Self(Order { coasts: true, ..self.0 })
+        Self(Order { besides: Besides::Coast, ..self.0 })
     }
 
     /// What it is to the core.

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use drivebus_drive::task::{Mailbox, Read, Task};
 use drivebus_drive::{
-    self as drive, Contradiction, Families, Family, FieldInput, Frequencies, Halt, Identification, Look, Looks,
-    NotHalted, NotPrepared, NotSettled, Order, Record, Rule, SameUnit, Setting, Speeds, Start, Taken,
+    self as drive, Besides, Contradiction, Families, Family, FieldInput, Frequencies, Halt, Identification, Look,
+    Looks, NotHalted, NotPrepared, NotSettled, Order, Record, Rule, SameUnit, Setting, Speeds, Start, Taken,
 };
 use drivebus_drives::{Command, Entry, Fault, Input, OwnedInput, Profile, Setpoint, Store};
 use drivebus_rtu::UnitAddress;
@@ -276,7 +276,7 @@ impl Named {
             // What was not taken by then is not waited for so long again.
             let within = until.saturating_duration_since(line.now());
             let command = if stops < STOPS { command } else { Command::Coast };
-            let order = Order { command, coasts: true, within, confirm: Halting::CONFIRM };
+            let order = Order { command, besides: Besides::Coast, within, confirm: Halting::CONFIRM };
             let Err(why) = self.halted(line, order).await else { return Ok(()) };
             // One that went out says more than a later one that did not.
             let known = failed.take().filter(|known| known.was_sent && !why.was_sent);
@@ -297,7 +297,10 @@ impl Named {
     fn halt_by(&self, line: &Mailbox<Error>, order: &Order) -> Halt<Error> {
         let named = self.to_halt_by(order.command);
         let can_coast = || named.rule().command(Command::Coast).is_ok();
-        let order = Order { coasts: order.coasts && can_coast(), ..order.clone() };
+        let mut order = order.clone();
+        if order.besides == Besides::Coast && !can_coast() {
+            order.besides = Besides::Nothing;
+        }
         Halt::new(named.taken(line), &named.record, order, Families::shipped(), line.now())
     }
 

@@ -331,13 +331,13 @@ impl Bus {
     }
 
     /// As [`leave_will`](Self::leave_will), for a client of this program, which [`carry_out_will`](Self::carry_out_will) halts
-    /// the unit for; `then` hears whether it took that. `None`: nobody could halt it.
+    /// the unit for; `then` hears whether it took that, and then what shows of it. `None`: nobody could halt it.
     #[cfg(feature = "tcp")]
     pub(crate) fn leave_will_for(
         &self,
         client: String,
         will: LastWill,
-        then: impl FnOnce(bool) + Send + 'static,
+        then: impl FnMut(bool, Option<&str>) + Send + 'static,
     ) -> Option<u64> {
         (!self.is_closed()).then(|| self.port().wills.leave_for(client, will, Box::new(then))).flatten()
     }

@@ -99,7 +99,9 @@ pub use health::hint::{By, Hint};
 pub use health::link::Link;
 pub use health::stats::{Counters, Latency, Program, Stats};
 pub use line::{Line, LineClock, Opener, PortError, PortErrorKind};
-pub use options::{AdapterEcho, BusOptions, CallOptions, LastWill, Share, UnitOptions};
+pub use options::{
+    AdapterEcho, BusOptions, CallOptions, HaltLine, Halted, Halter, LastWill, Named, Share, UnitOptions,
+};
 pub use poll::Poll;
 pub use poll::ring::{PollBatch, PollSample};
 pub use poll::samples::PollCounts;

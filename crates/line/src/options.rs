@@ -1,10 +1,13 @@
 //! What a bus, one of its units and one call may be told to do otherwise.
 
+mod halter;
+
 use std::time::Duration;
 
 use drivebus_rtu::{OwnEcho, Request, SerialFormat, TURNAROUND, UnitAddress};
 
 use crate::error::Failure;
+pub use crate::options::halter::{HaltLine, Halted, Halter};
 use crate::turns::order::Priority;
 use crate::turns::queue::DEFAULT_QUEUE;
 
@@ -41,6 +44,9 @@ pub struct BusOptions {
     /// workers, polls, and those of clients over the network. Where the system refuses that,
     /// [`Bus::notes`](crate::Bus::notes) says so.
     pub realtime: bool,
+    /// Who halts units for programs and clients that are gone, by what their families know; `None`: their
+    /// [`LastWill::ways`] are sent as they are.
+    pub halter: Option<&'static dyn Halter>,
 }
 
 impl BusOptions {
@@ -59,6 +65,7 @@ impl BusOptions {
             share: Share::Auto,
             group: None,
             realtime: false,
+            halter: None,
         }
     }
 
@@ -135,6 +142,12 @@ impl BusOptions {
     #[must_use]
     pub const fn realtime(self, realtime: bool) -> Self {
         Self { realtime, ..self }
+    }
+
+    /// Sets [`halter`](Self#structfield.halter).
+    #[must_use]
+    pub const fn halter(self, halter: Option<&'static dyn Halter>) -> Self {
+        Self { halter, ..self }
     }
 }
 
@@ -288,6 +301,11 @@ impl CallOptions {
 }
 
 /// What halts a unit when the program that runs it is gone without a word.
+///
+/// Whoever carries it out has a [halter](BusOptions::halter) halt the unit as it is [`named`](Self#structfield.named). Where
+/// it is named as no family that one knows, such as by somebody's own profile, or there is no halter, the
+/// [`ways`](Self#structfield.ways) are sent as they are, behind the [`look`](Self#structfield.look); then nobody looks whether
+/// the motor stands, and a unit of another family is not halted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct LastWill {
@@ -300,12 +318,14 @@ pub struct LastWill {
     pub look: Option<(Vec<u8>, Vec<Vec<u8>>)>,
     /// After how long a silence the unit acts by itself; zero where it does not.
     pub silence: Duration,
+    /// As what it is halted by who knows families.
+    pub named: Option<Named>,
 }
 
 impl LastWill {
     /// What halts `unit`: in one of these `ways`.
     pub fn new(unit: UnitAddress, ways: Vec<Vec<Vec<u8>>>) -> Self {
-        Self { unit, ways, look: None, silence: Duration::ZERO }
+        Self { unit, ways, look: None, silence: Duration::ZERO, named: None }
     }
 
     /// Sets [`look`](Self#structfield.look).
@@ -318,6 +338,45 @@ impl LastWill {
     #[must_use]
     pub fn silence(self, silence: Duration) -> Self {
         Self { silence, ..self }
+    }
+
+    /// Sets [`named`](Self#structfield.named).
+    #[must_use]
+    pub fn named(self, named: impl Into<Option<Named>>) -> Self {
+        Self { named: named.into(), ..self }
+    }
+}
+
+/// As what a unit was named that is to be halted, and how: names that a [`Halter`] knows, and nobody else here.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Named {
+    /// The family.
+    pub family: String,
+    /// The commands that halt it: the first is sent first.
+    pub commands: Vec<String>,
+    /// Whether that family is meant, whatever the unit says.
+    pub is_trusted: bool,
+    /// Whether what no document of the family proves is done all the same.
+    pub is_unverified: bool,
+}
+
+impl Named {
+    /// A unit of `family`, which these `commands` halt.
+    pub fn new(family: impl Into<String>, commands: Vec<String>) -> Self {
+        Self { family: family.into(), commands, is_trusted: false, is_unverified: false }
+    }
+
+    /// Sets [`is_trusted`](Self#structfield.is_trusted).
+    #[must_use]
+    pub fn trusted(self, is_trusted: bool) -> Self {
+        Self { is_trusted, ..self }
+    }
+
+    /// Sets [`is_unverified`](Self#structfield.is_unverified).
+    #[must_use]
+    pub fn unverified(self, is_unverified: bool) -> Self {
+        Self { is_unverified, ..self }
     }
 }
 

@@ -10,6 +10,7 @@ use pyo3::types::PyDict;
 use crate::convert::{one_word, table_of};
 use crate::errors::{bad_argument, port_error, refuse};
 use crate::format::SerialFormat;
+use crate::halter::ByFamily;
 use crate::open;
 
 /// What opens the port, and how the bus behaves then.
@@ -45,7 +46,8 @@ pub(crate) fn to_open(
             .queue(queue)
             .share(share)
             .group(group)
-            .realtime(realtime),
+            .realtime(realtime)
+            .halter(Some(&ByFamily)),
     ))
 }
 

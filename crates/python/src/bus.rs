@@ -18,6 +18,7 @@ use crate::convert::{any_unit, bytes_of, one_word, words_of};
 use crate::ending::detached;
 use crate::errors::{call_error, port_error, refuse};
 use crate::format::SerialFormat;
+use crate::halter::{GivenName, as_named};
 use crate::profile::Profile;
 use crate::signals::with_signals;
 use crate::{overhear, trace};
@@ -273,15 +274,16 @@ impl Bus {
     }
 
     /// Leaves what halts a unit when this program is gone without a word; `None` where nobody would find it.
-    #[pyo3(signature = (unit, ways, /, *, look = None, silence = 0.0))]
+    #[pyo3(signature = (unit, ways, /, *, look = None, silence = 0.0, named = None))]
     fn leave_will(
         &self,
         unit: &Bound<'_, PyAny>,
         ways: Vec<Vec<Vec<u8>>>,
         look: Option<(Vec<u8>, Vec<Vec<u8>>)>,
         silence: f64,
+        named: Option<GivenName<'_>>,
     ) -> PyResult<Option<u64>> {
-        let will = LastWill::new(any_unit(unit)?, ways).silence(duration("silence", silence)?);
+        let will = LastWill::new(any_unit(unit)?, ways).silence(duration("silence", silence)?).named(as_named(named));
         let will = match look {
             Some((question, others)) => will.look(question, others),
             None => will,

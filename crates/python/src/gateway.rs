@@ -15,23 +15,25 @@ use crate::arguments::duration;
 use crate::bus::Bus;
 use crate::convert::table_of;
 use crate::errors::{bad_argument, port_error, refuse};
+use crate::halter::{GivenName, as_named};
 
 /// Table and address, words, what it does, where the same is in RAM, name, and where it is shown.
 type GivenWrite = (String, u16, Option<Vec<u16>>, String, Option<u16>, String, Option<u16>);
 /// Networks, units, functions, and what may be written.
 type GivenRule = (Vec<String>, Vec<u8>, Vec<u8>, Vec<GivenWrite>);
-/// A unit, its stops, and its will: ways, look.
-type GivenHalts = (u8, Vec<GivenWrite>, Vec<Vec<Vec<u8>>>, Option<(Vec<u8>, Vec<Vec<u8>>)>);
+/// A unit, its stops, and its will: ways, look, and as what it is named.
+type GivenHalts<'py> =
+    (u8, Vec<GivenWrite>, Vec<Vec<Vec<u8>>>, Option<(Vec<u8>, Vec<Vec<u8>>)>, Option<GivenName<'py>>);
 
-fn rights(rules: Vec<GivenRule>, units: Vec<GivenHalts>) -> PyResult<Rights> {
+fn rights(rules: Vec<GivenRule>, units: Vec<GivenHalts<'_>>) -> PyResult<Rights> {
     let rules = rules.into_iter().map(|(networks, units, functions, writes)| {
         let networks = networks.iter().map(|text| text.parse::<Network>().map_err(refuse));
         let networks = networks.collect::<PyResult<_>>()?;
         Ok(Rule::new(functions).networks(networks).units(units).writes(writables(writes)?))
     });
     let mut rights = Rights::new(rules.collect::<PyResult<_>>()?);
-    for (unit, stops, ways, look) in units {
-        let will = LastWill::new(UnitAddress::by_name(unit), ways);
+    for (unit, stops, ways, look, named) in units {
+        let will = LastWill::new(UnitAddress::by_name(unit), ways).named(as_named(named));
         let will = match look {
             Some((question, others)) => will.look(question, others),
             None => will,
@@ -86,7 +88,7 @@ impl Gateway {
         within: f64,
         rtu: bool,
         rules: Vec<GivenRule>,
-        units: Vec<GivenHalts>,
+        units: Vec<GivenHalts<'_>>,
         dead_man: Option<f64>,
         audit: Option<PathBuf>,
     ) -> PyResult<Self> {

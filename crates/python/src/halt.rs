@@ -1,7 +1,7 @@
 //! `Halt` for Python: a halt that is sent until the unit takes it, and proved; why not, as a kind and what Python words.
 
 use drivebus_drive::task::Mailbox;
-use drivebus_drive::{self as drive, Families, NotHalted, Order, Taken, Tries, Why};
+use drivebus_drive::{self as drive, Besides, Families, NotHalted, Order, Taken, Tries, Why};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
@@ -37,7 +37,8 @@ impl Halt {
         confirm: f64,
     ) -> PyResult<Self> {
         let command = command.parse().map_err(refuse)?;
-        let order = Order { command, coasts, within: duration(within), confirm: duration(confirm) };
+        let besides = if coasts { Besides::Coast } else { Besides::Nothing };
+        let order = Order { command, besides, within: duration(within), confirm: duration(confirm) };
         let unit = looks.taken(drive::SameUnit::clone(&unit.core()));
         Ok(Self { unit, record: record.0.clone(), order })
     }

@@ -21,6 +21,7 @@ mod gateway;
 mod given;
 mod guard;
 mod halt;
+mod halter;
 mod identify;
 mod look;
 mod mailbox;

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from drivebus.line.asking import Asks
 
 if TYPE_CHECKING:
+    from drivebus import _native
     from drivebus.line.stats import Link
 
 __all__ = ["AwaitableBus", "AwaitsHalts", "BusProtocol", "CountsHalts", "KeepsWills"]
@@ -153,11 +154,14 @@ class KeepsWills(Protocol):
         *,
         look: tuple[bytes, Sequence[bytes]] | None = None,
         silence: float = 0.0,
+        named: tuple[_native.Profile, Sequence[str], bool, bool] | None = None,
     ) -> int | None:
         """Leaves it: the number of the will, or None where nobody would find it.
 
         *ways* are requests, as PDUs, each a way to halt; *look* is a read that goes before, and the answers to it by
         which another unit gives itself away; *silence* is the drive's own time-out, in seconds.
+        *named* is as what the unit is halted instead, where its family is a shipped one: its profile, the commands,
+        whether its name is trusted, and whether what is not verified is done.
         """
 
     def withdraw_will(self, number: int, /) -> None:

@@ -1,14 +1,17 @@
 """The last will of a program: what halts a unit that it runs, left with whoever has the port.
 
-A program that is killed tells nobody to stop. What it left says it for it: in the words of the unit's family, before
-anything else goes there. What becomes of it stands in the core.
+A program that is killed tells nobody to stop. What it left says it for it, before anything else goes there. Whoever
+carries it out halts the unit as `Halt` does: as the family that the unit shows, and with a proof. Where no shipped
+family was named, or a program does so that knows none, the frames of the will are sent as they are.
 """
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
+from typing import TypeAlias
 
-from drivebus import rtu, tables
+from drivebus import _native, rtu, tables
 from drivebus.identify import codes
 from drivebus.identify.contradiction import contradiction
 from drivebus.identify.refusals import Answer
@@ -17,7 +20,7 @@ from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
 from drivebus.profile.profile import native_of
 
-__all__ = ["WAYS", "LastWill", "look_of", "requests_of"]
+__all__ = ["WAYS", "LastWill", "Named", "look_of", "named_as", "requests_of"]
 
 _READ = {"coil": 0x01, "discrete": 0x02, "holding": 0x03, "input": 0x04}
 _WRITE_COIL = 0x05
@@ -26,6 +29,11 @@ _ANY = 1
 
 WAYS = ("stop", "coast")
 """What halts a motor, a jog included: the first of them first."""
+
+
+Named: TypeAlias = tuple[_native.Profile, list[str], bool, bool]
+"""As what a unit was named: its profile, the commands that halt it, whether that family is meant whatever the unit
+says, and whether what is not verified is done all the same."""
 
 
 class LastWill:
@@ -52,7 +60,8 @@ class LastWill:
             ways = [requests_of(unit.profile, way) for way in usable]
             if ways:
                 look = None if unit.identity.trusted else look_of(unit.profile)
-                self._number = line.leave_will(unit.address, ways, look=look, silence=self._silence)
+                named = named_as(unit, usable)
+                self._number = line.leave_will(unit.address, ways, look=look, silence=self._silence, named=named)
 
     def unsure(self) -> str:
         """Why the unit may run on when this program is gone, though it acts by itself when it hears nothing."""
@@ -73,6 +82,11 @@ class LastWill:
         self._number = None
         if number is not None and isinstance(line, KeepsWills):
             line.withdraw_will(number)
+
+
+def named_as(unit: DriveView, commands: Sequence[str]) -> Named:
+    """As what *unit* is halted by *commands*."""
+    return native_of(unit.profile), list(commands), unit.identity.trusted, unit.unverified
 
 
 def requests_of(profile: Profile, command: str) -> list[bytes]:

@@ -42,6 +42,7 @@ class Halts(NamedTuple):
     stops: list[Writable]
     ways: list[list[bytes]]
     look: tuple[bytes, Sequence[bytes]] | None
+    named: last_will.Named
 
 
 def moves(writes: Iterable[Writable]) -> bool:
@@ -82,9 +83,10 @@ def halts_of(unit: DriveView) -> Halts:
     """How *unit* is halted; without ways where no document proves one."""
     usable = [name for name in _STOPS if unit.evidence.unusable(name) is None]
     stops = [write for name in usable for write in _code(unit.evidence, name, "stops")]
-    ways = [last_will.requests_of(unit.profile, way) for way in last_will.WAYS if way in usable]
+    ends = [way for way in last_will.WAYS if way in usable]
+    ways = [last_will.requests_of(unit.profile, way) for way in ends]
     look = None if unit.identity.trusted else last_will.look_of(unit.profile)
-    return Halts(unit.address, stops, ways, look)
+    return Halts(unit.address, stops, ways, look, last_will.named_as(unit, ends))
 
 
 def is_what_it_should_be(unit: DriveView) -> None:

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use drivebus_line::url::{Known, PortOptions, PortUrl};
 use drivebus_line::{
-    AdapterEcho, Bus, BusOptions, CallError, CallOptions, Counters, Done, LastWill, Latency, Priority, Program,
+    AdapterEcho, Bus, BusOptions, CallError, CallOptions, Counters, Done, LastWill, Latency, Named, Priority, Program,
     UnitOptions, run_time_folder,
 };
 use drivebus_rtu::{AnswerLength, ExceptionCode, Meaning, Meanings, Request, SerialFormat, UnitAddress};
@@ -213,6 +213,7 @@ fn a_last_will_is_written_as_is_written_down() {
     let bus = open(&served.path());
     let will = LastWill::new(unit(1), vec![vec![vec![0x06, 0x20, 0x00, 0x00, 0x05]]])
         .look(vec![3, 0x21, 3, 0, 1], vec![vec![3, 2, 0x00, 0x12]])
+        .named(Named::new("abc", vec!["stop".to_owned()]).trusted(true))
         .silence(Duration::from_secs(1));
     let number = bus.leave_will(will).unwrap();
     let place = place(&served.path());

@@ -84,7 +84,7 @@ struct Halted {
 }
 
 pub(super) fn order(command: Command) -> Order {
-    Order { command, coasts: false, within: Duration::from_secs(2), confirm: Duration::from_secs(1) }
+    Order { command, besides: Besides::Nothing, within: Duration::from_secs(2), confirm: Duration::from_secs(1) }
 }
 
 fn halt(family: &Arc<Family>, order: Order, unit: impl Unit) -> Halted {
@@ -197,7 +197,7 @@ impl Unit for Acknowledges {
 fn a_silent_unit_is_told_for_as_long_as_was_said_and_no_oftener() {
     let mut motor = Motor::new(0.0);
     motor.always = fails(Cause::NoAnswer);
-    let halted = gd350(Order { coasts: true, ..order(Command::Stop) }, motor);
+    let halted = gd350(Order { besides: Besides::Coast, ..order(Command::Stop) }, motor);
     let most = order(Command::Stop).within.as_millis() / PAUSE.as_millis() + 1;
     assert!((2..=most).contains(&(halted.script.sent.len() as u128)));
     // Each fourth frame is a coast.
@@ -207,6 +207,15 @@ fn a_silent_unit_is_told_for_as_long_as_was_said_and_no_oftener() {
     let Why::Unanswered { tries, after: After::Seen(look), .. } = error.why else { panic!("{error}") };
     assert_eq!(tries.told.len(), halted.script.sent.len());
     assert_eq!(look.state, State::Forward);
+}
+
+#[test]
+fn two_commands_take_turns_until_one_is_taken() {
+    let mut motor = Motor::new(1000.0);
+    motor.confirms = [refuses(0x03), refuses(0x03), refuses(0x03), Ok(())].into();
+    let halted = gd350(Order { besides: Besides::InTurns(Command::Stop), ..order(Command::Coast) }, motor);
+    assert_eq!(halted.words(), [6, 5, 6, 5]);
+    halted.done.unwrap();
 }
 
 #[test]
@@ -431,10 +440,11 @@ proptest! {
         confirms in proptest::collection::vec(any_confirmation(), 1..6),
         command in proptest::sample::select(vec![Command::Stop, Command::Coast, Command::JogStop]),
         within in 0u64..1500,
-        (coasts, is_closed) in any::<(bool, bool)>(),
+        besides in proptest::sample::select(vec![Besides::Nothing, Besides::Coast, Besides::InTurns(Command::Coast)]),
+        is_closed: bool,
     ) {
         let confirm = Duration::from_millis(300);
-        let order = Order { command, coasts, within: Duration::from_millis(within), confirm };
+        let order = Order { command, besides, within: Duration::from_millis(within), confirm };
         let script = Script { is_closed, ..Script::new() };
         let may_act = |fault: &Fault| fault.was_sent() && !fault.cause().is_refusal();
         let went_out = confirms.iter().all(|each| each.as_ref().map_or_else(may_act, |()| true));

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use drivebus_drive::task::{Mailbox, Step, Task, Wish};
-use drivebus_drive::{Families, Halt, Identity, Looks, Order, Record, SameUnit, Speeds, Start, Taken, Unit, identify};
+use drivebus_drive::{
+    Besides, Families, Halt, Identity, Looks, Order, Record, SameUnit, Speeds, Start, Taken, Unit, identify,
+};
 use drivebus_drives::Command;
 use drivebus_rtu::UnitAddress;
 
@@ -117,7 +119,8 @@ impl Case {
                 }
                 _ => {
                     let command = if call == Call::Stop { Command::Stop } else { Command::Coast };
-                    let order = Order { command, coasts: false, within: Duration::from_millis(150), confirm };
+                    let order =
+                        Order { command, besides: Besides::Nothing, within: Duration::from_millis(150), confirm };
                     let mut halt = Halt::new(taken, &record, order, families, line.now());
                     return Done::Halted(halt.carry_out(&line, families).await);
                 }

@@ -2,14 +2,14 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::{Destination, Request, UnitAddress};
+use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::bus::call::Call;
 use crate::bus::errand::pdu_of;
 use crate::bus::port::Port;
 use crate::bus::shared::Shared;
 use crate::bus::wills::CarriesOut;
-use crate::error::Failure;
+use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
 use crate::share::message::{Told, Wish};
 use crate::share::place::Place;
@@ -42,6 +42,29 @@ impl CarriesOut for Shared {
 
     fn halt(&self, unit: UnitAddress, will: &Will, way: usize) -> Result<(), Failure> {
         halt(&self.port, unit, will, way)
+    }
+
+    fn ask(
+        &self,
+        unit: UnitAddress,
+        request: &Request<'_>,
+        options: CallOptions,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<(), Box<CallError>> {
+        let ask = self.port.ask(unit.into(), request, &options);
+        Call::new(&self.port, ask, options).run(&mut || self.port.is_shut(), take).map(drop)
+    }
+
+    fn now(&self) -> Instant {
+        self.port.now()
+    }
+
+    fn sleep(&self, time: Duration) {
+        self.port.sleep(time, &mut || self.port.is_shut());
+    }
+
+    fn reconnects(&self) -> u64 {
+        self.reconnects()
     }
 }
 

@@ -14,7 +14,7 @@ use crate::share::place::Place;
 
 /// Never called.
 #[cfg(feature = "tcp")]
-pub(super) type Then = Box<dyn FnOnce(bool) + Send>;
+pub(super) type Then = Box<dyn FnMut(bool, Option<&str>) + Send>;
 
 /// Whether there is a will at a place: there is none.
 #[cfg(all(any(unix, windows), feature = "share"))]

@@ -7,6 +7,7 @@
 //! Who has left nothing, and has nobody beside it who has, pays nothing for it: one thread looks after wills while there
 //! are any, and a request looks at one flag.
 
+mod as_named;
 mod halting;
 
 use std::collections::BTreeMap;
@@ -16,12 +17,12 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 use std::thread;
 use std::time::Duration;
 
-use drivebus_rtu::{Instant, UnitAddress};
+use drivebus_rtu::{Answer, Instant, Request, UnitAddress};
 
 use crate::bus::wills::halting::{AT_ONCE, Halting, Next};
-use crate::error::Failure;
+use crate::error::{CallError, Failure};
 use crate::line::Opener;
-use crate::options::{BusOptions, LastWill};
+use crate::options::{BusOptions, CallOptions, Halter, LastWill};
 use crate::ports::key::PortKey;
 use crate::share::guest::readable;
 use crate::share::message::Characters;
@@ -70,6 +71,24 @@ pub(super) trait CarriesOut: fmt::Debug + Send + Sync {
 
     /// Halts the unit in one of the ways of `will`.
     fn halt(&self, unit: UnitAddress, will: &Will, way: usize) -> Result<(), Failure>;
+
+    /// Asks the unit once its turn comes, and gives the answer to `take`.
+    fn ask(
+        &self,
+        unit: UnitAddress,
+        request: &Request<'_>,
+        options: CallOptions,
+        take: &mut dyn FnMut(Answer<'_>),
+    ) -> Result<(), Box<CallError>>;
+
+    /// Now, on the line's clock.
+    fn now(&self) -> Instant;
+
+    /// Waits on the line's clock.
+    fn sleep(&self, time: Duration);
+
+    /// How often the port was opened again.
+    fn reconnects(&self) -> u64;
 }
 
 /// The wills that one bus leaves, and those that it carries out.
@@ -79,6 +98,8 @@ pub(super) struct Wills {
     group: Option<u32>,
     characters: Characters,
     timeout: Duration,
+    /// Who knows families of units.
+    halter: Option<&'static dyn Halter>,
     bus: OnceLock<Weak<dyn CarriesOut>>,
     /// Whether there is anybody who is being halted.
     halts: AtomicBool,
@@ -113,8 +134,16 @@ struct Left {
     then: Option<Then>,
 }
 
-/// Hears whether a unit took its halt; not called where another program halts it.
-pub(super) type Then = Box<dyn FnOnce(bool) + Send>;
+/// Hears whether a unit took its halt, and then, where somebody looked, what shows of that; not called where another program
+/// halts it.
+pub(super) type Then = Box<dyn FnMut(bool, Option<&str>) + Send>;
+
+/// Who was told that a unit took its halt, and hears what shows of that.
+#[derive(Default)]
+struct Told {
+    note: Option<String>,
+    then: Vec<Then>,
+}
 
 /// A unit that is being halted, for whom.
 #[derive(Debug)]
@@ -132,6 +161,7 @@ impl Wills {
             group: options.group,
             characters: Characters::of(&options.format),
             timeout: options.timeout,
+            halter: options.halter,
             bus: OnceLock::new(),
             halts: AtomicBool::new(false),
             state: Mutex::default(),
@@ -219,7 +249,9 @@ impl Wills {
     /// The unit of `left` is to be halted.
     fn enlist(&self, state: &mut State, left: Left) {
         let will = &left.will;
+        let by_family = self.halter.is_some() && will.named.is_some();
         let course = Halting::new(will.ways.len(), will.look.is_some(), Duration::from_nanos(will.silence));
+        let course = course.by_family(by_family);
         let halted = state.halting.entry(UnitAddress::by_name(will.unit)).or_insert_with(|| Halted {
             course,
             wills: Vec::new(),
@@ -323,6 +355,7 @@ impl Wills {
         Will {
             unit: last.unit.get(),
             ways: last.ways,
+            named: last.named.map(Into::into),
             look: last.look,
             timeout: nanos(self.timeout.min(LONGEST_ANSWER)),
             silence: nanos(last.silence),
@@ -447,6 +480,12 @@ impl Wills {
                     self.of(unit, |halted| halted.course.halted(monotonic(), outcome.is_ok(), is_lost));
                     took = outcome.is_ok().then_some(true);
                 }
+                Next::HaltAsNamed(within) => {
+                    drop(shared);
+                    if self.halt_as_named(bus, unit, &will, within) {
+                        return;
+                    }
+                }
                 Next::Wait(until) => {
                     drop(shared);
                     thread::sleep(until.saturating_duration_since(monotonic()).min(LOOKS));
@@ -477,18 +516,26 @@ impl Wills {
         self.changed.notify_all();
     }
 
-    fn is_done(&self, unit: UnitAddress, will: &Will, took: bool) {
+    /// Whether `unit` is still being halted by this bus.
+    fn halts(&self, unit: UnitAddress) -> bool {
+        self.lock().halting.contains_key(&unit)
+    }
+
+    fn is_done(&self, unit: UnitAddress, will: &Will, took: bool) -> Told {
         let mut state = self.lock();
         let halted = state.halting.remove(&unit);
         self.halts.store(!state.halting.is_empty(), Ordering::Release);
         let wills = halted.map(|halted| halted.wills).unwrap_or_default();
+        let mut told = Told::default();
         if wills.iter().any(|left| left.then.is_none()) {
             let who = format!("{} (process {}), which ran it, is gone", will.program, will.process);
-            state.note(&if took {
+            let note = if took {
                 format!("unit {unit} was told to halt, and took it: {who}")
             } else {
                 format!("unit {unit} was not told to halt: {who}, and another drive answers at its address now")
-            });
+            };
+            state.note(&note);
+            told.note = Some(note);
         }
         state.telling += 1;
         drop(state);
@@ -496,12 +543,24 @@ impl Wills {
             if let Some(paper) = paper {
                 paper.remove();
             }
-            if let Some(then) = then {
-                then(took);
+            if let Some(mut then) = then {
+                then(took, None);
+                told.then.push(then);
             }
         }
         self.lock().telling -= 1;
         self.changed.notify_all();
+        told
+    }
+
+    /// What the unit shows of the halt that it took, for those who were told of that.
+    fn shows(&self, told: Told, shown: &str) {
+        if let Some(note) = told.note {
+            self.lock().note_more(&note, &format!("{note}. {shown}"));
+        }
+        for mut then in told.then {
+            then(true, Some(shown));
+        }
     }
 
     /// Leaves the halt of `unit` to who has the port.
@@ -530,6 +589,14 @@ impl State {
             self.notes.push(text.to_owned());
             let more = self.notes.len().saturating_sub(NOTES);
             self.notes.drain(..more);
+        }
+    }
+
+    /// What was told of by `note` is known better.
+    fn note_more(&mut self, note: &str, text: &str) {
+        match self.notes.iter_mut().find(|known| *known == note) {
+            Some(known) => text.clone_into(known),
+            None => self.note(text),
         }
     }
 }

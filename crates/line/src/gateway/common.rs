@@ -75,9 +75,10 @@ impl Wills for WillsOf<'_> {
     fn leave(&self, unit: u8) -> Option<u64> {
         let will = self.common.rights.units.get(&unit)?.will.clone();
         let (counts, name) = (Arc::clone(&self.common.counts), self.name.to_owned());
-        self.common
-            .open_bus()?
-            .leave_will_for(format!("client {name}"), will, move |took| counts.halted(&name, unit, took))
+        self.common.open_bus()?.leave_will_for(format!("client {name}"), will, move |took, shown| match shown {
+            None => counts.halted(&name, unit, took),
+            Some(shown) => counts.shows(&name, unit, shown),
+        })
     }
 
     fn withdraw(&self, will: u64) {

@@ -137,6 +137,11 @@ impl Counts {
         });
     }
 
+    /// What shows of a halt that the unit took.
+    pub(super) fn shows(&self, client: &str, unit: u8, shown: &str) {
+        self.tell(format!("unit {unit}, which was halted for {client}: {shown}"));
+    }
+
     pub(super) fn late(&self) {
         count(&self.late);
     }

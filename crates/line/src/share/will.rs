@@ -18,12 +18,13 @@ use drivebus_rtu::Instant;
 use rustix::fs::{FlockOperation, OFlags, fcntl_lock};
 use serde::{Deserialize, Serialize};
 
+use crate::options::Named;
 use crate::share::message::Characters;
 use crate::share::place::Place;
 use crate::system::process::Process;
 
 /// How a file says what is written in it.
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 /// Bytes before what is written: when the program was alive last, and the version.
 const HEAD: usize = 9;
 /// No will is longer.
@@ -36,6 +37,8 @@ pub(crate) struct Will {
     pub(crate) unit: u8,
     /// Each halts the unit: PDUs that follow each other.
     pub(crate) ways: Vec<Vec<Vec<u8>>>,
+    /// As what it is halted where families are known.
+    pub(crate) named: Option<NamedAs>,
     /// What the unit is asked first, and what it answers if it is another one than is meant.
     pub(crate) look: Option<(Vec<u8>, Vec<Vec<u8>>)>,
     /// How long an answer is waited for, in nanoseconds.
@@ -49,6 +52,29 @@ pub(crate) struct Will {
     pub(crate) program: String,
     pub(crate) process: u32,
     pub(crate) characters: Characters,
+}
+
+/// As what a unit was named: [`Named`](crate::options::Named), as it is written.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct NamedAs {
+    pub(crate) family: String,
+    pub(crate) commands: Vec<String>,
+    pub(crate) is_trusted: bool,
+    pub(crate) is_unverified: bool,
+}
+
+impl From<Named> for NamedAs {
+    fn from(named: Named) -> Self {
+        let Named { family, commands, is_trusted, is_unverified } = named;
+        Self { family, commands, is_trusted, is_unverified }
+    }
+}
+
+impl From<NamedAs> for Named {
+    fn from(named: NamedAs) -> Self {
+        let NamedAs { family, commands, is_trusted, is_unverified } = named;
+        Self { family, commands, is_trusted, is_unverified }
+    }
 }
 
 /// The file of a will, held.
@@ -236,6 +262,7 @@ mod tests {
         Will {
             unit: 3,
             ways: vec![vec![vec![6, 0x20, 0, 0, 5]], vec![vec![6, 0x20, 0, 0, 6]]],
+            named: Some(Named::new("gd350", vec!["stop".to_owned(), "coast".to_owned()]).unverified(true).into()),
             look: Some((vec![3, 0x21, 3, 0, 1], vec![vec![3, 2, 1, 0xA0]])),
             timeout: 300_000_000,
             silence: 2_000_000_000,

@@ -7,6 +7,9 @@
 //! | its own time-out is over | nothing at all: each halt that it refuses feeds that, too |
 //! | it took a halt | a halt every 5 s; others may ask it |
 //!
+//! Where a [`Halter`](crate::options::Halter) knows its family, that one asks who it is, and halts it, in the second row for
+//! all of the time that is left, and in the last row once.
+//!
 //! Here it is decided only; who sends is in `bus::wills`.
 
 use std::time::Duration;
@@ -29,10 +32,21 @@ pub(super) enum Next {
     Look,
     /// Halt it in this way.
     Halt(usize),
+    /// Have it halted by who knows families, within this time.
+    HaltAsNamed(Duration),
     /// Let this moment come.
     Wait(Instant),
     /// Nothing: it took a halt, or is another one.
     Over,
+}
+
+/// Who halts a unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum By {
+    /// The bus, frame by frame.
+    Frames,
+    /// Somebody who knows families.
+    Family,
 }
 
 /// One unit on its way to a halt.
@@ -40,6 +54,7 @@ pub(super) enum Next {
 pub(super) struct Halting {
     ways: usize,
     looks: bool,
+    by: By,
     /// After how long a silence the unit acts by itself; zero: it does not.
     silence: Duration,
     /// Whether it still has to say who it is.
@@ -59,6 +74,7 @@ impl Halting {
         Self {
             ways,
             looks,
+            by: By::Frames,
             silence,
             unknown: looks,
             began: None,
@@ -69,6 +85,11 @@ impl Halting {
         }
     }
 
+    /// The same, of a unit that somebody halts who knows families, where that is so.
+    pub(super) fn by_family(self, is_so: bool) -> Self {
+        Self { by: if is_so { By::Family } else { By::Frames }, ..self }
+    }
+
     /// What is next at `now`.
     pub(super) fn next(&mut self, now: Instant) -> Next {
         if self.over {
@@ -77,11 +98,26 @@ impl Halting {
         if now < self.due {
             return Next::Wait(self.due);
         }
-        if self.unknown {
+        if self.unknown && self.by == By::Frames {
             return Next::Look;
         }
-        self.began.get_or_insert(now);
+        let began = *self.began.get_or_insert(now);
+        if self.by == By::Family {
+            let left = AT_ONCE.saturating_sub(now.saturating_duration_since(began));
+            return Next::HaltAsNamed(if self.is_late() { Duration::ZERO } else { left });
+        }
         Next::Halt(self.sent % self.ways)
+    }
+
+    /// Who knows families does not know the one that it was named as.
+    pub(super) fn is_of_no_family(&mut self) {
+        self.by = By::Frames;
+    }
+
+    /// Who knows families came to no end by `now`: in all the time that was given, or else before.
+    pub(super) fn was_not_halted(&mut self, now: Instant, in_all_that_time: bool) {
+        let is_late = in_all_that_time || self.is_late();
+        self.ended(now, is_late);
     }
 
     /// The unit was asked who it is: whether it said that it `is_another`.
@@ -97,6 +133,10 @@ impl Halting {
         // Behind a line that is opened again, another unit may have the address.
         self.unknown = lost && self.looks;
         let is_late = self.began.is_some_and(|began| now.saturating_duration_since(began) >= AT_ONCE);
+        self.ended(now, is_late);
+    }
+
+    fn ended(&mut self, now: Instant, is_late: bool) {
         self.due = now + if is_late { SELDOM } else { APART };
         if is_late && self.left_alone.is_none() {
             let alone = if self.silence.is_zero() { now } else { now + self.silence + MARGIN };
@@ -136,6 +176,7 @@ mod tests {
                 }
                 Next::Wait(due) => now = due,
                 Next::Look => halting.looked(false),
+                Next::HaltAsNamed(_) => panic!("nobody here knows families"),
                 Next::Over => break,
             }
         }
@@ -183,6 +224,34 @@ mod tests {
         halting.looked(true);
         assert_eq!(halting.next(at(1)), Next::Over);
         assert!(!halting.is_kept_from_others(at(1)));
+    }
+
+    #[test]
+    fn who_knows_families_has_ten_seconds_and_then_goes_once_each_five() {
+        let mut halting = Halting::new(2, true, Duration::from_secs(7)).by_family(true);
+        assert_eq!(halting.next(at(0)), Next::HaltAsNamed(Duration::from_secs(10)), "it asks for itself");
+        halting.was_not_halted(at(3_000), false);
+        assert_eq!(halting.next(at(3_000)), Next::Wait(at(3_100)));
+        assert_eq!(halting.next(at(3_100)), Next::HaltAsNamed(Duration::from_millis(6_900)));
+        // By a clock that goes faster than this one.
+        halting.was_not_halted(at(4_000), true);
+        assert!(halting.is_late());
+        assert_eq!(halting.next(at(4_000)), Next::Wait(at(11_500)), "nothing feeds its time-out");
+        assert!(halting.is_kept_from_others(at(11_499)) && !halting.is_kept_from_others(at(11_500)));
+        let Next::HaltAsNamed(within) = halting.next(at(11_500)) else { panic!("{halting:?}") };
+        assert_eq!(within, Duration::ZERO);
+        halting.was_not_halted(at(12_000), true);
+        assert_eq!(halting.next(at(12_000)), Next::Wait(at(17_000)));
+    }
+
+    #[test]
+    fn of_a_family_that_nobody_knows_it_is_asked_and_halted_frame_by_frame() {
+        let mut halting = Halting::new(1, true, Duration::ZERO).by_family(true);
+        assert_eq!(halting.next(at(0)), Next::HaltAsNamed(AT_ONCE));
+        halting.is_of_no_family();
+        assert_eq!(halting.next(at(0)), Next::Look);
+        halting.looked(false);
+        assert_eq!(halting.next(at(0)), Next::Halt(0));
     }
 
     #[test]
