@@ -157,7 +157,11 @@ def test_a_halt_goes_on_until_the_drive_takes_it() -> None:
     ("is_now", "by", "shown"),
     [
         # What stops a GD350 runs an EDS300 (its manual, p. 44).
-        ("eds300", ["6"], "It shows that it is a ENC EDS300, and was halted as that. Its state proves the halt"),
+        (
+            "eds300",
+            ["6"],
+            "By what it shows it is another drive (ENC EDS300), and was halted as that. Its state proves the halt",
+        ),
         ("coast 03", ["5", "6"], "Its state proves the halt"),
         ("stuck", ["5"], "It is not proved: it was taken, and the state does not show it: forward"),
     ],

@@ -46,7 +46,10 @@ impl Halter for ByFamily {
         let as_what = if taken_as.same().family().name() == named.family {
             String::new()
         } else {
-            format!("It shows that it is a {}, and was halted as that. ", taken_as.same().family().profile().title())
+            format!(
+                "By what it shows it is another drive ({}), and was halted as that. ",
+                taken_as.same().family().profile().title()
+            )
         };
         match done {
             Ok(()) if taken_as.tells_its_state() => Halted::Took(format!("{as_what}Its state proves the halt")),

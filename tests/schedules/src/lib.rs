@@ -26,7 +26,12 @@ mod system {
 use shipped::{ask, by_unit, error, line, options, trace};
 
 #[path = "../../../crates/line/src"]
-#[allow(dead_code, unreachable_pub, reason = "the whole of what is shipped, of which the scenarios need some")]
+#[allow(
+    dead_code,
+    unreachable_pub,
+    unused_imports,
+    reason = "the whole of what is shipped, of which the scenarios need some"
+)]
 mod shipped {
     pub(crate) mod ask;
     pub(crate) mod by_unit;
