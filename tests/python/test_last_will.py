@@ -235,7 +235,7 @@ def test_another_family_at_the_address_is_halted_as_that_and_by_no_word_that_run
     with drivebus.Bus(shop.port, parity="N", timeout=1.0) as bus:
         assert shop.wait_for(stands, swapped).what == "6"
         note = note_of_the_halt(bus)
-    assert "By what it shows it is another drive (ENC EDS300), and was halted as that. Its state proves the halt" in note
+    assert "it is another drive (ENC EDS300), and was halted as that. Its state proves the halt" in note
     assert [said.what for said in shop.frames(swapped) if said.is_halt] == ["010620000006"]
 
 

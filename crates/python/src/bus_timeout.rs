@@ -2,9 +2,7 @@
 //! Python words.
 
 use drivebus_drive::task::Mailbox;
-use drivebus_drive::{
-    self as drive, Back, Families, NotArmable, NotArmed, NotAsked, NotGivenBack, NotRead, OnSilence, WhyNotArmed,
-};
+use drivebus_drive::{self as drive, Back, Families, NotArmable, NotArmed, NotAsked, NotRead, OnSilence, WhyNotArmed};
 use drivebus_drives::Value;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -14,7 +12,7 @@ use crate::errors::refuse;
 use crate::not_done::{Told, raised, settled_told};
 use crate::not_kept::{held, not_kept, not_kept_told};
 use crate::rule::Rule;
-use crate::task::{Failed, Task, is_done, or_why, unknown};
+use crate::task::{Failed, Task, or_why, unknown};
 use crate::unit::Unit;
 
 /// A drive's own time-out of the bus; see `python/drivebus/_native.pyi`.
@@ -111,16 +109,6 @@ impl BusTimeout {
     {
         let timeout = self.0.clone();
         unit.task(|unit, line| work(timeout, unit, line), told)
-    }
-}
-
-/// Whether the motor rests, or why that is not known.
-pub(crate) fn rests(py: Python<'_>, done: Result<bool, NotGivenBack<Failed>>) -> PyResult<Py<PyAny>> {
-    match done {
-        Ok(rests) => is_done(py, rests),
-        Err(NotGivenBack::Unseen(_)) => ("unseen", py.None()).into_py_any(py),
-        Err(NotGivenBack::Failed(error)) => Err(error.into()),
-        Err(why) => Err(unknown(&why)),
     }
 }
 

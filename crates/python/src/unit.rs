@@ -5,7 +5,6 @@ use drivebus_drive::{self as drive, Families, Setting, Start, Words};
 use drivebus_drives::{Place, Profile, Setpoint};
 use pyo3::prelude::*;
 
-use crate::bus_timeout::rests;
 use crate::clock::duration;
 use crate::convert::place_of;
 use crate::errors::bad_argument;
@@ -14,7 +13,7 @@ use crate::not_done::{not_commanded, not_set, not_settled, not_written, setting}
 use crate::record::Record;
 use crate::same_unit::SameUnit;
 use crate::task::{Failed, Task, is_done, or_why};
-use crate::waits::{status, time_limit, waited};
+use crate::waits::{rests, status, time_limit, waited};
 
 /// One call to a unit; see `python/drivebus/_native.pyi`.
 #[pyclass(name = "Unit", frozen, module = "drivebus._native")]

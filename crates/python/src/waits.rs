@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drivebus_drive::{NotReached, NotRead, Status};
+use drivebus_drive::{NotGivenBack, NotReached, NotRead, Status};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
@@ -20,6 +20,16 @@ pub(crate) fn time_limit(seconds: f64) -> Duration {
 
 pub(crate) fn status(py: Python<'_>, done: Result<Status, NotRead<Failed>>) -> PyResult<Py<PyAny>> {
     done.map_or_else(|why| not_read(py, why), |status| is_done(py, moment(status)))
+}
+
+/// Whether the motor rests, or why that is not known.
+pub(crate) fn rests(py: Python<'_>, done: Result<bool, NotGivenBack<Failed>>) -> PyResult<Py<PyAny>> {
+    match done {
+        Ok(rests) => is_done(py, rests),
+        Err(NotGivenBack::Unseen(_)) => ("unseen", py.None()).into_py_any(py),
+        Err(NotGivenBack::Failed(error)) => Err(error.into()),
+        Err(why) => Err(unknown(&why)),
+    }
 }
 
 pub(crate) fn waited(py: Python<'_>, done: Result<Status, NotReached<Failed>>) -> PyResult<Py<PyAny>> {
