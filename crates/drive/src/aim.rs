@@ -65,7 +65,7 @@ pub struct Aim {
 struct Look {
     apart: Apart,
     is_doubted: bool,
-    /// Whether it answered anything over this connection, or may have: also that it is busy.
+    /// Whether it answered anything over this connection that came whole: also that it is busy.
     has_spoken: bool,
     heard: Instant,
     /// How often the port had been opened again when it was asked last.
@@ -144,7 +144,7 @@ impl Aim {
                     return Err(NotTaken::NotTold(NotTold::Failed(error)));
                 }
                 Err(error) if may_be_of(unit, error.raw()) => {
-                    self.with(|look| (look.has_spoken, look.heard) = (true, line.now()));
+                    self.with(|look| look.heard = line.now());
                     return Ok(None);
                 }
                 // Silence is no evidence. Where it spoke before, or against its name, the line lost this one.
