@@ -76,6 +76,19 @@ pub enum Besides {
     InTurns(Command),
 }
 
+/// What follows from a look at a unit that took a halt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Judged {
+    /// It is looked at again.
+    Open,
+    /// It is halted.
+    Proved,
+    /// It only acknowledged the halt, and is told again.
+    Untaken,
+    /// It was halted as another family meanwhile, and that is to be proved.
+    Anew,
+}
+
 /// One unit that is to be halted.
 #[derive(Debug)]
 pub struct Halt<E> {
@@ -156,29 +169,37 @@ impl<E: LineError> Halt<E> {
         self.until_taken(line, families).await?;
         loop {
             let mut proof = self.prove(line, families).await?;
-            let shown = loop {
+            let next = loop {
                 let looked = proof.look(line, &self.unit, &self.record).await;
-                self.looked = line.now();
-                match looked {
-                    Ok(true) => break Ok(()),
-                    Ok(false) => line.sleep(proof.pause(line.now())).await.map_err(Why::Failed)?,
-                    Err(why) => break Err(why),
+                match self.judged(line, families, looked).await? {
+                    Judged::Open => line.sleep(proof.pause(line.now())).await.map_err(Why::Failed)?,
+                    judged => break judged,
                 }
             };
-            match shown {
-                Ok(()) if self.order.confirm.is_zero() || !self.was_another(line, families).await? => return Ok(()),
-                Ok(()) => {}
-                // What was only acknowledged may not have been carried out.
-                Err(why) if why.is_unproved() && !self.is_confirmed && !self.is_over(line) => {
-                    self.until_taken(line, families).await?;
-                }
-                Err(why) if why.is_unproved() => {
-                    if self.vouch_anew(line, families).await? != Anew::Another {
-                        return Err(why);
-                    }
-                }
-                Err(why) => return Err(why),
+            match next {
+                Judged::Proved => return Ok(()),
+                Judged::Untaken => self.until_taken(line, families).await?,
+                Judged::Open | Judged::Anew => {}
             }
+        }
+    }
+
+    /// What follows from a look that is over.
+    async fn judged(
+        &mut self,
+        line: &Mailbox<E>,
+        families: &Families,
+        looked: Result<bool, Why<E>>,
+    ) -> Result<Judged, Why<E>> {
+        self.looked = line.now();
+        match looked {
+            Ok(false) => Ok(Judged::Open),
+            Ok(true) if self.order.confirm.is_zero() || !self.was_another(line, families).await? => Ok(Judged::Proved),
+            Err(why) if !why.is_unproved() => Err(why),
+            // What was only acknowledged may not have been carried out.
+            Err(_) if !self.is_confirmed && !self.is_over(line) => Ok(Judged::Untaken),
+            Err(why) if self.vouch_anew(line, families).await? != Anew::Another => Err(why),
+            Ok(true) | Err(_) => Ok(Judged::Anew),
         }
     }
 

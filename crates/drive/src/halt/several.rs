@@ -9,9 +9,8 @@ use std::time::Duration;
 
 use drivebus_rtu::Instant;
 
-use super::Halt;
 use super::not_halted::{NotHalted, Why};
-use super::vouching::Anew;
+use super::{Halt, Judged};
 use crate::aim::goes_out_at_once;
 use crate::families::Families;
 use crate::harm::What;
@@ -86,23 +85,14 @@ impl<E: LineError> Halt<E> {
     async fn next(&mut self, line: &Mailbox<E>, families: &Families) -> Result<bool, Why<E>> {
         if let Some(mut proof) = self.proof.take() {
             let looked = proof.look(line, &self.unit, &self.record).await;
-            self.looked = line.now();
-            match looked {
-                Ok(false) => {
+            match self.judged(line, families, looked).await? {
+                Judged::Open => {
                     self.proof = Some(proof);
                     return Ok(false);
                 }
-                Ok(true) if self.order.confirm.is_zero() || !self.was_another(line, families).await? => {
-                    return Ok(true);
-                }
-                Ok(true) => {}
-                // What was only acknowledged may not have been carried out.
-                Err(why) if why.is_unproved() && !self.is_confirmed && !self.is_over(line) => self.is_taken = false,
-                Err(why) => {
-                    if !why.is_unproved() || self.vouch_anew(line, families).await? != Anew::Another {
-                        return Err(why);
-                    }
-                }
+                Judged::Proved => return Ok(true),
+                Judged::Untaken => self.is_taken = false,
+                Judged::Anew => {}
             }
         }
         if self.is_taken {
