@@ -265,9 +265,9 @@ impl BusTimeout {
 
 /// What was read of these `codes`.
 fn held(codes: &[&str], read: &Values) -> Vec<Held> {
-    let unit = |code: &str| read.profile.find(code).map_or("", |entry| entry.quantity().unit()).to_owned();
     let all = codes.iter().zip(&read.values);
-    all.map(|(&code, &value)| Held { name: code.to_owned(), value, unit: unit(code) }).collect()
+    // What was read is there.
+    all.filter_map(|(&code, &value)| Some(Held::of(code, read.profile.find(code).ok()?, value))).collect()
 }
 
 impl Unit {

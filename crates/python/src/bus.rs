@@ -13,7 +13,7 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 use crate::arguments::{
     duration, open_failed, options_for, read_options, read_request, to_open, write_options, write_request,
 };
-use crate::clock::{UnixClock, to_seconds, unix_time};
+use crate::clock::{UnixClock, calendar_ahead, to_seconds};
 use crate::convert::{any_unit, bytes_of, one_word, words_of};
 use crate::ending::detached;
 use crate::errors::{call_error, port_error, refuse};
@@ -387,7 +387,7 @@ impl Bus {
     }
 
     pub(crate) fn around(core: CoreBus) -> Self {
-        let virtual_ahead = core.is_virtual().then(|| unix_time() - to_seconds(core.now()));
+        let virtual_ahead = core.is_virtual().then(|| calendar_ahead(&core));
         Self { core: Arc::new(core), virtual_ahead }
     }
 

@@ -14,7 +14,7 @@ pub(crate) struct UnixClock {
 impl UnixClock {
     /// `virtual_ahead` is where a simulation's clock stands on the calendar.
     pub(crate) fn of(core: &CoreBus, virtual_ahead: Option<f64>) -> Self {
-        Self { ahead: virtual_ahead.unwrap_or_else(|| unix_time() - to_seconds(core.now())) }
+        Self { ahead: virtual_ahead.unwrap_or_else(|| calendar_ahead(core)) }
     }
 
     pub(crate) fn at(self, moment: Instant) -> f64 {
@@ -22,9 +22,14 @@ impl UnixClock {
     }
 }
 
-/// The calendar's time: seconds since 1970.
-pub(crate) fn unix_time() -> f64 {
-    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs_f64()
+/// How many seconds the calendar is ahead of the line's clock now.
+pub(crate) fn calendar_ahead(core: &CoreBus) -> f64 {
+    unix_time().as_secs_f64() - to_seconds(core.now())
+}
+
+/// The calendar's time since 1970.
+pub(crate) fn unix_time() -> Duration {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default()
 }
 
 /// A moment of the line's clock in seconds since it began.

@@ -3,7 +3,7 @@
 
 use std::fmt;
 use std::sync::Arc;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use drivebus_drive::task::{
     Cause, LineError, Mailbox, Notice, Outcome, Payload, Read, Seen, Stamped, Step, Task, Wish, Write,
@@ -14,6 +14,7 @@ use drivebus_line::{CallError, CallOptions, ErrorKind, Failure, HaltLine, Halted
 use drivebus_rtu::{Answer, Instant, Meaning, Request, Table, UnitAddress};
 use pyo3::prelude::*;
 
+use crate::clock::unix_time;
 use crate::profile::Profile;
 
 /// How long a unit is looked at for a proof.
@@ -126,10 +127,6 @@ fn driven<T>(mut task: Task<T, Failed>, line: &mut dyn HaltLine) -> Option<(T, b
             Step::Wish(_) => return None,
         });
     }
-}
-
-fn unix_time() -> Duration {
-    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default()
 }
 
 fn table_of(place: Place) -> Option<Table> {

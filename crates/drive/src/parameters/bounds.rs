@@ -93,8 +93,7 @@ impl Unit {
             let Some((limit, &bound)) = self.profile().find(other).ok().zip(in_force.get(other)) else { continue };
             let is_within = if is_low { value >= bound.to_f64() } else { value <= bound.to_f64() };
             if !is_within {
-                let unit = limit.quantity().unit().to_owned();
-                let limit = Held { name: other.to_owned(), value: bound, unit };
+                let limit = Held::of(other, limit, bound);
                 return Err(Box::new(Beyond { wanted: item.held(item.word), limit, is_below: is_low }));
             }
         }

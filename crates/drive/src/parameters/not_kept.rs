@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use drivebus_drives::{AccessError, NameError, State, Value, ValueError};
+use drivebus_drives::{AccessError, Entry, NameError, State, Value, ValueError};
 use drivebus_rtu::UnitAddress;
 use thiserror::Error;
 
@@ -135,6 +135,13 @@ pub struct Held {
     pub value: Value,
     /// In which unit that is; may be empty.
     pub unit: String,
+}
+
+impl Held {
+    /// The `value` of `entry`, by this name.
+    pub(crate) fn of(name: &str, entry: &Entry, value: Value) -> Self {
+        Self { name: name.to_owned(), value, unit: entry.quantity().unit().to_owned() }
+    }
 }
 
 impl fmt::Display for Held {

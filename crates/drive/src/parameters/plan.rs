@@ -36,8 +36,7 @@ impl Planned<'_> {
 
     /// The same with `word` in its place.
     pub(super) fn held(&self, word: u16) -> Held {
-        let quantity = self.entry.quantity();
-        Held { name: self.name.to_owned(), value: quantity.decode(word), unit: quantity.unit().to_owned() }
+        Held::of(self.name, &self.entry, self.entry.quantity().decode(word))
     }
 }
 
