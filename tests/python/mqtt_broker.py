@@ -21,7 +21,7 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.subscribeoptions import SubscribeOptions
 
-from .tcp_client import seen
+from .tcp_client import free_port, seen
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 ANYBODY = "allow_anonymous true\n"
@@ -62,8 +62,7 @@ class Broker:
     """
 
     def __init__(self, folder: Path, rules: str = ANYBODY) -> None:
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            self.port: int = server.getsockname()[1]
+        self.port = free_port()
         self.folder = folder
         self._file = folder / "mosquitto.conf"
         own = "user root\n" if hasattr(os, "geteuid") and os.geteuid() == 0 else ""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -15,7 +14,7 @@ from drivebus.service import Service
 from drivebus.web import hashed
 
 from .plant_text import HALL, drive, served
-from .tcp_client import seen
+from .tcp_client import free_port, seen
 
 MARIA, OTTO = "correct horse battery", "only looking on"
 """Passwords: of who may order, and of who looks."""
@@ -88,8 +87,7 @@ def page_plant(folder: Path, interval: float = 0.2, dead_man: object = 60, more:
                 motor = bus.drive(unit, "gd350")
                 motor.prepare_control()
                 motor.write({"P00.11": 0.5, "P00.12": 0.5})
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            port = free.getsockname()[1]
+        port = free_port()
         people = {"maria": hash_of(MARIA), "otto": hash_of(OTTO)}
         text = PLANT.format(port=simulator.port, web=port, interval=interval, dead_man=dead_man, **people)
         file.write_text(text + more)

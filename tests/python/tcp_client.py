@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
+import os
 import socket
 import struct
 import threading
@@ -10,6 +13,21 @@ from collections.abc import Callable
 from drivebus import Gateway
 
 HERE = "127.0.0.1:0"
+
+_ports = itertools.count()
+
+
+def free_port() -> int:
+    """A port for a server whose number a file has to name.
+
+    It lies below those that a system gives to programs that name none (32 768 and up on Linux), and each worker has
+    its own thousand: nobody else takes it before the server does.
+    """
+    first = 20_000 + 1_000 * (int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]) % 12)
+    while True:
+        port = first + next(_ports) % 1_000
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            return port
 
 
 def connected(gateway: Gateway, source: str = "127.0.0.1") -> socket.socket:

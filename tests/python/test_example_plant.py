@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import urllib.request
 from pathlib import Path
 
@@ -12,7 +11,7 @@ pytest.importorskip("starlette")
 
 
 from .plant_text import served
-from .tcp_client import seen
+from .tcp_client import free_port, seen
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 DRIVES = {"pump1", "pump2", "fan", "conveyor"}
@@ -22,8 +21,7 @@ def test_its_page_opens_and_its_drives_answer(tmp_path: Path) -> None:
     text = (ROOT / "examples/plant.toml").read_text(encoding="utf-8")
     free = {}
     for port in ("8080", "1502"):
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            free[port] = server.getsockname()[1]
+        free[port] = free_port()
         assert f'"127.0.0.1:{port}"' in text
         text = text.replace(f'"127.0.0.1:{port}"', f'"127.0.0.1:{free[port]}"')
     file = tmp_path / "drivebus.toml"

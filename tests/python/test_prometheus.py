@@ -17,7 +17,7 @@ from drivebus.sinks import DrivePicture, GatewayPicture, LinePicture, Picture, P
 from drivebus.site import Site
 from drivebus.spool import Layout
 
-from .tcp_client import seen
+from .tcp_client import free_port, seen
 
 UNITS = ("Hz", "kHz", "V", "A", "kW", "kWh", "%", "s", "ms", "h", "°C", "Ω", "mH", "Nm", "rpm", "", "raw", "odd/unit")
 ALL = Layout("pump", "gd350", tuple(f"value{place}" for place in range(len(UNITS))), UNITS, (0,) * len(UNITS))
@@ -132,8 +132,7 @@ def test_a_service_tells_of_its_drives(tmp_path: Path) -> None:
     file = tmp_path / "drivebus.toml"
     heard: list[str] = []
     with Simulator({1: "gd350", 2: "vfd500"}, transport="tcp", baudrate=115200) as simulator:
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            port = server.getsockname()[1]
+        port = free_port()
         file.write_text(
             f'[lines.hall]\nport = "{simulator.port}"\nbaud = 115200\n'
             '[drives.pump]\nline = "hall"\nunit = 1\nprofile = "gd350"\n'

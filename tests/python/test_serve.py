@@ -14,14 +14,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import minimalmodbus
 import pytest
+from pymodbus.client import ModbusSerialClient
 
 from drivebus import Simulator
 from drivebus.spool import Spool
 
 from .conftest import NO_PTY
-from .tcp_client import answer, request, seen
+from .tcp_client import answer, free_port, request, seen
 
 RUN, STOP, LOOK = b"\x06\x20\x00\x00\x01", b"\x06\x20\x00\x00\x05", b"\x03\x21\x03\x00\x01"
 
@@ -127,11 +127,6 @@ def test_a_mistake_is_named_with_its_line_and_nothing_starts(
         assert done.returncode == 2
         assert any(f"{file}:{line}: " in told and said in told for told in done.stderr.splitlines()), done.stderr
     assert not (tmp_path / "audit.jsonl").exists()
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
 
 
 @contextmanager
@@ -349,12 +344,13 @@ def test_a_mistake_in_a_poll(tmp_path: Path, old: str, new: str, line: int, said
 
 @NO_PTY
 def test_a_program_that_knows_serial_ports_alone(tmp_path: Path) -> None:
-    with plant(tmp_path) as (_, file, _, environment), service(file, environment):
-        master = minimalmodbus.Instrument(str(tmp_path / "plc"), 1)
-        master.serial.timeout = 20
-        assert master.read_register(0x2103) == 0x01A0
-        with pytest.raises(minimalmodbus.IllegalRequestError):
-            master.write_register(0x2000, 1, functioncode=6)
+    with (
+        plant(tmp_path) as (_, file, _, environment),
+        service(file, environment),
+        ModbusSerialClient(str(tmp_path / "plc"), timeout=20, retries=0) as master,
+    ):
+        assert master.read_holding_registers(0x2103, device_id=1).registers == [0x01A0]
+        assert master.write_register(0x2000, 1, device_id=1).exception_code == 1
 
 
 @NO_PTY
