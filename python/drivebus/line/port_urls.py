@@ -9,15 +9,17 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from errno import EIO
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivebus import _native, checks
 from drivebus._native import SerialFormat
 from drivebus.errors import BadArgument, PortError
 from drivebus.profile import profiles
-from drivebus.sim import FAULT_KINDS, Simulator
 
-__all__ = ["format_of", "resolve"]
+if TYPE_CHECKING:
+    from drivebus.sim import Simulator
+
+__all__ = ["as_simulator", "format_of", "resolve"]
 
 _PYSERIAL_SCHEMES = ("rfc2217", "loop", "spy", "hwgrep", "alt", "cp2110")
 
@@ -29,12 +31,12 @@ def resolve(port: object, line: SerialFormat) -> Any:
         NotAllowed: It is no port at all, or a URL that nobody opens.
         PortError: pyserial could not open it.
     """
-    if isinstance(port, Simulator):
-        return port
     if isinstance(port, os.PathLike):
         port = os.fspath(port)
     if isinstance(port, str):
         return _resolve_text(port, line)
+    if as_simulator(port) is not None:
+        return port
     if callable(getattr(port, "read", None)) and callable(getattr(port, "write", None)):
         return port
     raise BadArgument(
@@ -45,9 +47,11 @@ def resolve(port: object, line: SerialFormat) -> Any:
 
 def format_of(port: object, asked: SerialFormat) -> SerialFormat:
     """The format for *port*: an open serial port and a simulator keep their own, everything else takes *asked*."""
-    if isinstance(port, Simulator):
-        return port.format
-    if isinstance(port, (str, os.PathLike)) or not hasattr(port, "baudrate"):
+    if isinstance(port, (str, os.PathLike)):
+        return asked
+    if (simulator := as_simulator(port)) is not None:
+        return simulator.format
+    if not hasattr(port, "baudrate"):
         return asked
     return SerialFormat(
         getattr(port, "baudrate", asked.baudrate),
@@ -58,12 +62,23 @@ def format_of(port: object, asked: SerialFormat) -> SerialFormat:
     )
 
 
+def as_simulator(port: object) -> Simulator | None:
+    """*port*, where it is a simulator. One that is text never is: what a simulator needs is not loaded for it."""
+    if isinstance(port, str):
+        return None
+    from drivebus.sim import Simulator
+
+    return port if isinstance(port, Simulator) else None
+
+
 def _resolve_text(port: str, line: SerialFormat) -> Any:
     try:
         port.encode()
     except UnicodeError:
         raise BadArgument(f"port {checks.shown(port)} is not in UTF-8, and no port can be called that") from None
-    scheme, simulator = _native.port_url(port, schemes=_PYSERIAL_SCHEMES, families=profiles(), faults=FAULT_KINDS)
+    scheme, simulator = _native.port_url(
+        port, schemes=_PYSERIAL_SCHEMES, families=profiles(), faults=_native.fault_kinds()
+    )
     if scheme == "sim":
         return _simulator(simulator, line)
     return _open_pyserial(port, line) if scheme in _PYSERIAL_SCHEMES else port
@@ -89,6 +104,8 @@ def _open_pyserial(url: str, line: SerialFormat) -> Any:
 
 def _simulator(arguments: Mapping[str, Any], line: SerialFormat) -> Simulator:
     """The simulator that a URL asks for, in this process."""
+    from drivebus.sim import Simulator
+
     return Simulator(
         **arguments,
         baudrate=line.baudrate,

@@ -15,12 +15,12 @@ from drivebus.line import port_urls
 from drivebus.line.addresses import Addresses
 from drivebus.line.trace import Trace
 from drivebus.line.units import Units
-from drivebus.sim import Simulator, core_of, lasting_port
 from drivebus.strict_attributes import known_keywords
 
 if TYPE_CHECKING:
     from drivebus.line.pcapng_trace import WireFile
     from drivebus.line.stats import Stats
+    from drivebus.sim import Simulator
 
 __all__ = ["BusFace", "Opening", "check_trust"]
 
@@ -81,10 +81,10 @@ class Opening:
         _check_together(port, self.keywords)
         target = port_urls.resolve(port, line)
         self.format = port_urls.format_of(target, line)
-        self.simulator = target if isinstance(target, Simulator) else None
+        self.simulator = port_urls.as_simulator(target)
         self.owned = target if target is not port and not isinstance(target, str) else None
-        if isinstance(target, Simulator):
-            target = core_of(target) if target.transport == "process" else lasting_port(target)
+        if self.simulator is not None:
+            target = _line_of(self.simulator)
         self.target = target
         self.known = Units(Addresses.of(target, reserved=checks.flag("reserved", reserved)))
         self.shown = str(port)
@@ -101,6 +101,12 @@ def check_trust(profile: object, trust: object) -> None:
     """Refuses trust in a *profile* that was not named: what the drive says it is, it cannot contradict."""
     if checks.flag("trust_profile", trust) and profile is None:
         raise BadArgument(Text("trust_profile needs a profile: give ", argument("profile"), " too"))
+
+
+def _line_of(simulator: Simulator) -> object:
+    from drivebus.sim import core_of, lasting_port
+
+    return core_of(simulator) if simulator.transport == "process" else lasting_port(simulator)
 
 
 def _group_number(group: object) -> int | None:

@@ -7,7 +7,7 @@ written only for who says so.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivebus import _native, checks
 from drivebus.advice import Advice, Text, argument, call
@@ -18,9 +18,11 @@ from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.in_parts import in_parts
 from drivebus.profile.evidence import not_verified
-from drivebus.values import Control, ControlItem
 
-__all__ = ["check_control", "ignored", "item_of", "prepare_control"]
+if TYPE_CHECKING:
+    from drivebus.values import Control, ControlItem
+
+__all__ = ["check_control", "ignored", "item_of", "prepare_control", "shown"]
 
 
 async def check_control(unit: DriveView, setpoint: str | None = None, *, unverified: bool = False) -> Control:
@@ -35,7 +37,7 @@ async def check_control(unit: DriveView, setpoint: str | None = None, *, unverif
         NoAnswer, BadAnswer, Refused: See each.
     """
     unit = unit.trusting(unverified)
-    return _shown(unit, await _settings(unit, setpoint))
+    return shown(unit, await _settings(unit, setpoint))
 
 
 @by_name("store", after=0)
@@ -65,7 +67,7 @@ async def prepare_control(
     kind, told = await call_core(unit, lambda core: _native.Values(core).prepare(wanted, store))
     if kind != "done":
         raise _not_prepared(unit, *told, store=store)
-    return _shown(unit, told)
+    return shown(unit, told)
 
 
 def _not_prepared(unit: DriveView, kind: str, told: Any, *, store: bool) -> DrivebusError:
@@ -75,7 +77,7 @@ def _not_prepared(unit: DriveView, kind: str, told: Any, *, store: bool) -> Driv
         return not_kept.written_before(not_kept.in_words(unit, *why, store=store), done)
     if kind == "unshown":
         return Unconfirmed(
-            f"unit {unit.address} took the settings and shows others:\n{_shown(unit, told)}", unit=unit.address
+            f"unit {unit.address} took the settings and shows others:\n{shown(unit, told)}", unit=unit.address
         )
     item = item_of(unit, told)
     if kind == "may_not":
@@ -100,7 +102,7 @@ def ignored(unit: DriveView, setpoint: str, register: str, rows: Iterable[Sequen
     """Why the drive would not heed *setpoint*: it takes that from elsewhere, as the settings in *rows* say."""
     return NotReady(
         Text(
-            f"unit {unit.address} would ignore its {setpoint.replace('_', ' ')} setpoint:\n{_shown(unit, rows)}\n"
+            f"unit {unit.address} would ignore its {setpoint.replace('_', ' ')} setpoint:\n{shown(unit, rows)}\n"
             "Nothing was sent. ",
             Advice("prepare_control", setpoint, f'prepare_control(setpoint="{setpoint}")'),
             " sets it so; ",
@@ -114,6 +116,8 @@ def ignored(unit: DriveView, setpoint: str, register: str, rows: Iterable[Sequen
 
 def item_of(unit: DriveView, row: Sequence[Any]) -> ControlItem:
     """A setting of *unit*, of which the core told this *row*."""
+    from drivebus.values import ControlItem
+
     code, wanted, actual, label, note, verified, _ = row
     return ControlItem(
         code=code,
@@ -139,5 +143,8 @@ def _check_known(unit: DriveView, setpoint: str | None) -> None:
         checks.one_of("setpoint", setpoint, unit.profile.setpoint_names())
 
 
-def _shown(unit: DriveView, settings: Iterable[Sequence[Any]]) -> Control:
+def shown(unit: DriveView, settings: Iterable[Sequence[Any]]) -> Control:
+    """The *settings* of *unit*, of each of which the core told a row."""
+    from drivebus.values import Control
+
     return Control(item_of(unit, row) for row in settings)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Coroutine
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 from drivebus.line.blocking import at_once
 from drivebus.line.protocols import AwaitableBus
@@ -14,7 +14,9 @@ from drivebus.operations import registers
 from drivebus.operations.drive_view import DriveView
 from drivebus.plain_annotations import plain_annotations
 from drivebus.profile import Profile
-from drivebus.values import Description, Value
+
+if TYPE_CHECKING:
+    from drivebus.values import Description, Value
 
 __all__ = ["DriveFace", "awaited", "blocking", "documented_by", "unit_of", "views"]
 

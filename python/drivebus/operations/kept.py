@@ -7,12 +7,15 @@ and what is stored again and again wears the EEPROM.
 from __future__ import annotations
 
 import warnings
+from typing import TYPE_CHECKING
 
 from drivebus._native import STORES_BEFORE_NOTICE
 from drivebus.advice import Advice, Text
 from drivebus.errors import StoreWarning, level_of_the_program
 from drivebus.operations.drive_view import DriveView
-from drivebus.values import Description
+
+if TYPE_CHECKING:
+    from drivebus.values import Description
 
 __all__ = ["is_in_ram", "key", "put_in_ram", "stored", "warn_of_wear"]
 

@@ -11,7 +11,8 @@ import functools
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from drivebus import _native, rtu, tables
+from drivebus import _native, tables
+from drivebus._native import encode_write
 from drivebus.identify import codes
 from drivebus.identify.contradiction import contradiction
 from drivebus.identify.refusals import Answer
@@ -99,7 +100,7 @@ def _write(profile: Profile, place: int, word: int) -> bytes:
     table, address = tables.split(place)
     if table == "coil":
         return bytes([_WRITE_COIL]) + address.to_bytes(2, "big") + (b"\xff\0" if word else b"\0\0")
-    return _pdu(rtu.encode_write(_ANY, address, [word] if native_of(profile).is_written_by_many else word))
+    return _pdu(encode_write(_ANY, address, [word] if native_of(profile).is_written_by_many else word))
 
 
 def _pdu(frame: bytes) -> bytes:

@@ -6,15 +6,16 @@ A new reason against a start is a check in the core (`crates/drive/src/ready.rs`
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivebus.advice import Advice, Text, argument, call
 from drivebus.errors import BadLink, DrivebusError, NotReady
-from drivebus.line.stats import Link
 from drivebus.operations import bus_control, glances
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile.evidence import Evidence, refusal_of
-from drivebus.values import Control
+
+if TYPE_CHECKING:
+    from drivebus.line.stats import Link
 
 __all__ = ["in_words"]
 
@@ -41,6 +42,8 @@ def in_words(unit: DriveView, command: str | None, kind: str, told: Any) -> Driv
     if kind == "unstoppable":
         return _unstoppable(unit)
     if kind == "bad_link":
+        from drivebus.line.stats import Link
+
         link, lost, looks = told
         return _bad_link(unit, Link(*link), lost, looks)
     if kind == "settings":
@@ -119,7 +122,7 @@ def _settings(unit: DriveView, then: str, wrong: list[Any]) -> NotReady:
     return NotReady(
         Text(
             f"unit {unit.address} {_SET_OTHERWISE[then]}:\n"
-            f"{Control(bus_control.item_of(unit, row) for row in wrong)}\nNothing that moves it was sent. ",
+            f"{bus_control.shown(unit, wrong)}\nNothing that moves it was sent. ",
             call("prepare_control"),
             " sets what is needed",
         ),

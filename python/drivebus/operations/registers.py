@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 from drivebus.advice import Text
 from drivebus.errors import BadArgument
@@ -14,7 +14,9 @@ from drivebus.operations.explained import explained
 from drivebus.profile import Profile
 from drivebus.profile.evidence import Evidence
 from drivebus.profile.plan import labelled
-from drivebus.values import Snapshot, Value
+
+if TYPE_CHECKING:
+    from drivebus.values import Snapshot, Value
 
 __all__ = ["contradiction", "monitor", "monitored", "read", "readable", "settled_profile", "snapshot", "value"]
 
@@ -55,6 +57,8 @@ async def read(
 
 async def snapshot(unit: DriveView, *names: str, verify: bool = False, unverified: bool = False) -> Snapshot:
     """Reads *names* in the fewest requests, under one time stamp. *verify* and *unverified* as for `read`."""
+    from drivebus.values import Snapshot
+
     unit = unit.trusting(unverified)
     unit.evidence.require_readable(names)
     unit = await unit_variants.settled(unit, *names)

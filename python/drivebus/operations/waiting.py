@@ -5,7 +5,7 @@ What is asked meanwhile, and what ends the wait, is decided in the core (`crates
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivebus import checks
 from drivebus.errors import BadArgument, DrivebusError, NotAllowed, NotReached, Unconfirmed
@@ -13,7 +13,9 @@ from drivebus.operations import state, unit_variants
 from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile.evidence import refusal_of
-from drivebus.values import Status
+
+if TYPE_CHECKING:
+    from drivebus.values import Status
 
 __all__ = ["check_standstill", "wait_for_speed", "wait_until_stopped"]
 

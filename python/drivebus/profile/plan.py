@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from drivebus import _native
-from drivebus.values import Choice, Description, Value
+
+if TYPE_CHECKING:
+    from drivebus.values import Description, Value
 
 __all__ = ["ReadPlan", "labelled"]
 
@@ -13,7 +16,11 @@ __all__ = ["ReadPlan", "labelled"]
 def labelled(row: Description, value: float) -> Value:
     """*value* with its label, where *row* has one for it. A float is no choice, although one may equal its number."""
     label = row.choices.get(value) if row.choices and isinstance(value, int) else None
-    return value if label is None else Choice(int(value), label)
+    if label is None:
+        return value
+    from drivebus.values import Choice
+
+    return Choice(int(value), label)
 
 
 class ReadPlan:
