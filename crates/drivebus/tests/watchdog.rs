@@ -13,8 +13,8 @@ mod tapped;
 
 use std::future::Future;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, channel, sync_channel};
+use std::sync::{Arc, Mutex};
 use std::task::{Context, Wake, Waker};
 use std::time::Duration;
 
@@ -270,6 +270,10 @@ fn a_future_that_is_dropped_leaves_nothing_in_the_drive() {
     for (steps, waits) in (1..).flat_map(|steps| [(steps, true), (steps, false)]) {
         let plant = gd350();
         let drive = plant.drive.aio();
+        // What is asked for is not there before the step that asks for it is over: no step is two.
+        let gate = Arc::new(Mutex::new(()));
+        let passed = Arc::clone(&gate);
+        plant.tap(move |_| drop(passed.lock().unwrap()));
         let mut program = Box::pin(async {
             let watchdog = drive.watchdog(LONG, OnSilence::Stop).await?;
             watchdog.close().await
@@ -277,7 +281,9 @@ fn a_future_that_is_dropped_leaves_nothing_in_the_drive() {
         let (bell, rung) = sync_channel(1);
         let waker = Waker::from(Arc::new(Bell(bell)));
         let is_over = (1..=steps).any(|step| {
+            let held = gate.lock().unwrap();
             let polled = program.as_mut().poll(&mut Context::from_waker(&waker));
+            drop(held);
             if polled.is_pending() && (waits || step < steps) {
                 rung.recv().unwrap();
             }
