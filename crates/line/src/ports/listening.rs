@@ -3,7 +3,9 @@
 //! Linux tells it when it is asked, and lists it. The list is of all connections, whose looking up takes milliseconds: it
 //! is read only where the system does not let one ask.
 
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
+use std::net::IpAddr;
+#[cfg(any(target_os = "linux", test))]
+use std::net::{Ipv4Addr, Ipv6Addr};
 
 #[cfg(target_os = "linux")]
 mod asked;
@@ -11,8 +13,8 @@ mod asked;
 mod tables;
 
 /// A socket that listens.
+#[cfg(any(target_os = "linux", test))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(not(any(target_os = "linux", test)), expect(dead_code, reason = "only Linux tells them"))]
 struct Listener {
     /// Of the family of the socket, as it was bound.
     ip: IpAddr,
@@ -37,7 +39,7 @@ pub(crate) fn listening(_ip: IpAddr, _port: u16) -> Option<u64> {
 
 /// Who listens at the address itself goes before who listens at all of them. Several may share a port: the first stands for
 /// them.
-#[cfg_attr(not(any(target_os = "linux", test)), expect(dead_code, reason = "only Linux tells them"))]
+#[cfg(any(target_os = "linux", test))]
 fn ends_at(listeners: &[Listener], ip: IpAddr, port: u16) -> Option<u64> {
     let at = |ip: IpAddr| {
         let there = listeners.iter().filter(|listener| listener.ip == ip && listener.port == port);

@@ -9,6 +9,7 @@ use std::net::IpAddr;
 use super::Listener;
 
 /// All that listen; none where the system lists nothing.
+#[cfg(target_os = "linux")]
 pub(super) fn listeners() -> Vec<Listener> {
     let tables = ["/proc/net/tcp", "/proc/net/tcp6"].map(|path| std::fs::read_to_string(path).unwrap_or_default());
     tables.iter().flat_map(|table| of_table(table)).collect()
