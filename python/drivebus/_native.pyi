@@ -955,6 +955,13 @@ class Profile:
     @property
     def title(self) -> str: ...
     @property
+    def maker(self) -> str:
+        """Empty where the profile does not say."""
+    @property
+    def models(self) -> list[str]: ...
+    def aliases(self) -> list[tuple[str, str, str]]:
+        """Name, note and source of each."""
+    @property
     def functions(self) -> list[int]: ...
     def requests(self) -> dict[str, Any]:
         """`joined`, `across_groups`, `verified`, `note`, `source`."""

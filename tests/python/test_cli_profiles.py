@@ -79,6 +79,18 @@ class TestShow:
         known = {row["name"]: row for row in rows("profiles")}
         assert list(known) == drivebus.profiles()
         assert known["gd350"]["kind"] == "inverter"
+        assert all(row["maker"] for row in known.values())
+        assert (known["ms300"]["maker"], known["ms300"]["models"]) == ("Delta", ["VFD-MS300"])
+        assert known["chf100a"]["aliases"] == ["Huanyang GT", "Fuling DZB200"]
+
+    @pytest.mark.parametrize(
+        ("called", "family"), [("VFD-MS300", "ms300"), ("altivar 312", "atv312"), ("huanyang GT", "chf100a")]
+    )
+    def test_what_stands_on_a_drive_is_a_name_too(self, called: str, family: str) -> None:
+        [known] = rows("profiles", "show", called)
+        assert known["name"] == family
+        assert drivebus.Profile.find(called) is drivebus.Profile.builtin(family)
+        assert called.lower() in run("profiles", "show", family).stdout.lower().replace("schneider ", "")
 
 
 class TestNew:

@@ -8,6 +8,7 @@
 //! between them, `sense` what cannot be meant, `fit` whether what came from below still fits.
 
 mod assemble;
+mod called;
 mod entries;
 mod facts;
 mod fit;
@@ -188,13 +189,15 @@ impl Builtin {
 }
 
 impl Profile {
-    /// A shipped profile, by its name in upper or lower case. It is loaded once and shared.
+    /// A shipped profile, by its name, or by what its drives are called ([`Called`](crate::Called)): `atv312`, `ATV312`,
+    /// `Altivar 312`. Case, blanks and signs are not looked at. It is loaded once and shared.
     ///
     /// # Errors
     ///
     /// [`ProfileError::Unknown`]: none has this name; the closest is named.
     pub fn builtin(name: &str) -> Result<Arc<Self>, ProfileError> {
-        match BUILTINS.iter().find(|builtin| builtin.name.eq_ignore_ascii_case(name.trim())) {
+        let by_name = || BUILTINS.iter().find(|builtin| builtin.name.eq_ignore_ascii_case(name.trim()));
+        match by_name().or_else(|| called::shipped(name)) {
             Some(builtin) => {
                 let load = || first(check_files(&builtin.files(), None, &[])).map(Arc::new);
                 builtin.loaded.get_or_init(load).clone()

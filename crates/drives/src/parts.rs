@@ -1,5 +1,6 @@
 //! What a profile is made of beside its registers and parameters: each a fact of the family, with what proves it.
 
+pub(crate) mod called;
 pub(crate) mod command;
 pub(crate) mod fault;
 pub(crate) mod identification;

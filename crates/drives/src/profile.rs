@@ -17,6 +17,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use crate::entry::{Access, AccessError, Entry, Kind, Store};
+use crate::parts::called::Called;
 use crate::parts::command::{Command, CommandCode, Control, StartWord};
 use crate::parts::fault::{Exception, Fault};
 use crate::parts::identification::{Identification, Signature};
@@ -45,6 +46,7 @@ pub struct Profile {
     /// The families whose codes a unit may report, its own first.
     pub(crate) reports_as: Vec<String>,
     pub(crate) title: String,
+    pub(crate) called: Called,
     pub(crate) kind: UnitKind,
     pub(crate) version: u32,
     pub(crate) source: String,
@@ -102,6 +104,11 @@ impl Profile {
     /// Its name for people: `INVT Goodrive350`.
     pub fn title(&self) -> &str {
         &self.title
+    }
+
+    /// Who makes its drives, and what they are called beside its name and title.
+    pub fn called(&self) -> &Called {
+        &self.called
     }
 
     /// Whether it feeds a motor.

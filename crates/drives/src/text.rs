@@ -30,6 +30,11 @@ pub(crate) fn parse_loose_address(text: &str) -> Option<u16> {
     parse_address(&text).or_else(|| (text.len() == 4).then(|| parse_address(&format!("0x{text}"))).flatten())
 }
 
+/// What is left of the name of a drive when case, blanks and signs are not looked at: `VFD-E` and `vfd e` are alike.
+pub(crate) fn folded(name: &str) -> String {
+    name.chars().filter(|letter| letter.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+}
+
 /// The group of a parameter, as its code says it: `P05` of P05.06, `C1` of C1-01, `ACC` of ACC.
 pub(crate) fn group(code: &str) -> &str {
     code.split(['.', '-']).next().unwrap_or(code)

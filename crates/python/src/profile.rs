@@ -111,6 +111,22 @@ impl Profile {
     }
 
     #[getter]
+    fn maker(&self) -> &str {
+        &self.0.called().maker
+    }
+
+    #[getter]
+    fn models(&self) -> Vec<&str> {
+        self.0.called().models.iter().map(String::as_str).collect()
+    }
+
+    /// Name, note and source of each.
+    fn aliases(&self) -> Vec<(&str, &str, &str)> {
+        let aliases = self.0.called().aliases.iter();
+        aliases.map(|alias| (alias.name.as_str(), alias.note.as_str(), alias.source.as_str())).collect()
+    }
+
+    #[getter]
     fn max_words(&self) -> u16 {
         self.0.max_words()
     }

@@ -194,10 +194,21 @@ def complete_group(context: click.Context, _parameter: click.Parameter, incomple
     return completions(text for text in dict.fromkeys(texts) if text.lower().startswith(incomplete.lower()))
 
 
+def _called(profile: drivebus.Profile) -> list[str]:
+    """What people may call drives of *profile*, beside its name."""
+    aliases = (alias.name for alias in profile.aliases())
+    return [profile.title.removeprefix(profile.maker).strip(), *profile.models, *aliases]
+
+
 def complete_profile(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Names of the shipped profiles, and folders, for the shell."""
-    known = completions(name for name in drivebus.profiles() if name.startswith(incomplete))
-    return known or completions([incomplete], "dir")
+    begun = incomplete.lower()
+    known = [name for name in drivebus.profiles() if name.startswith(begun)]
+    if not known and begun:
+        # What has a blank in it a shell takes apart.
+        called = (name for family in drivebus.profiles() for name in _called(drivebus.Profile.builtin(family)))
+        known = sorted(name for name in called if name.lower().startswith(begun) and " " not in name)
+    return completions(known) or completions([incomplete], "dir")
 
 
 def complete_units(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 __all__ = [
+    "Alias",
     "FactorySerial",
     "IdentificationCode",
     "Memory",
@@ -35,6 +36,21 @@ class _Fact(Mapping[str, Any]):
 
     def _names(self) -> list[str]:
         return [field.name for field in fields(self)]  # type: ignore[arg-type]  # each kind is a dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Alias(_Fact):
+    """A drive under another name that has the registers and commands of a family.
+
+    Attributes:
+        name: Its maker and its name, such as `"Huanyang GT"`.
+        note: How much of the family is known of it.
+        source: Who says so.
+    """
+
+    name: str
+    note: str
+    source: str
 
 
 @dataclass(frozen=True, slots=True)

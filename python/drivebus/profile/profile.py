@@ -15,6 +15,7 @@ from drivebus.errors import BadArgument, Decision
 
 if TYPE_CHECKING:
     from drivebus.profile.facts import (
+        Alias,
         FactorySerial,
         IdentificationCode,
         Memory,
@@ -47,7 +48,9 @@ class Profile:
 
     @classmethod
     def builtin(cls, name: str) -> Profile:
-        """A shipped profile by its name.
+        """A shipped profile by its name, or by what its drives are called: `"atv312"`, `"ATV312"`, `"Altivar 312"`.
+
+        Case, blanks and signs are not looked at.
 
         Raises:
             NotAllowed: There is none of that name; the message has the closest.
@@ -92,6 +95,22 @@ class Profile:
     def title(self) -> str:
         """The family as its maker calls it."""
         return self._native.title
+
+    @property
+    def maker(self) -> str:
+        """Who makes the drives of this family; empty where the profile does not say."""
+        return self._native.maker
+
+    @property
+    def models(self) -> list[str]:
+        """What its maker calls drives of this family beside the title; each is taken in place of the name."""
+        return self._native.models
+
+    def aliases(self) -> list[Alias]:
+        """Drives under another name that are this family; each name is taken in place of the profile's."""
+        from drivebus.profile.facts import Alias
+
+        return [Alias(*each) for each in self._native.aliases()]
 
     @property
     def family(self) -> str:
@@ -477,8 +496,9 @@ def native_of(profile: Profile) -> _native.Profile:
 
 @functools.cache
 def _builtin(name: str) -> Profile:
-    # One object each: equal profiles are the same profile.
-    return Profile(_native.Profile.builtin(name))
+    # One object each, whatever it is called: equal profiles are the same profile.
+    native = _native.Profile.builtin(name)
+    return Profile(native) if native.name == name else _builtin(native.name)
 
 
 def _fault(row: dict[str, Any]) -> Fault:

@@ -110,6 +110,7 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
         (None, Some(base)) => Some(base.title.clone()),
         (None, None) => problems.keep(Err(missing("title"))),
     };
+    let called = facts::called(manifest, base.as_ref());
     let kind = manifest.kind.or(base.as_ref().map(|base| base.kind)).ok_or_else(|| missing("kind"));
     let kind = problems.keep(kind);
     if base.is_none() && manifest.version.is_none() {
@@ -131,6 +132,7 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
             family,
             reports_as,
             title,
+            called,
             kind,
             version,
             requests,
@@ -142,6 +144,7 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
             family,
             reports_as,
             title,
+            called,
             kind,
             version,
             requests,

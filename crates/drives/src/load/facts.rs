@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use super::entries::Entries;
-use super::manifest::{self, Field, line};
+use super::manifest::{self, Field, Manifest, line};
 use super::placed::Placed;
 use super::problems::Problems;
 use super::{File, ProfileError};
 use crate::bits::BitField;
 use crate::decimal::{Counts, Decimal};
+use crate::parts::called::{Alias, Called};
 use crate::parts::command::Control;
 use crate::parts::fault::{Exception, Means};
 use crate::parts::identification::{Identification, Signature};
@@ -18,6 +19,7 @@ use crate::parts::serial::SerialDefaults;
 use crate::parts::variant::{Variant, VariantChoice};
 use crate::parts::watchdog::Watchdog;
 use crate::place::Place;
+use crate::profile::Profile;
 use crate::quantity::{Quantity, limits};
 use crate::scale::Scale;
 use crate::text::parse_address;
@@ -102,6 +104,31 @@ pub(super) fn identifications(
         });
     }
     known
+}
+
+/// What its drives are called: of a profile that adds to another, what that one says where it says nothing itself. A sister
+/// family has names of its own.
+pub(super) fn called(manifest: &Manifest, base: Option<&Profile>) -> Called {
+    let below = base.map(|base| &base.called);
+    let same = below.filter(|_| manifest.overlay.is_some());
+    let models = manifest.models.as_ref().map(|names| names.iter().map(|name| name.get_ref().clone()).collect());
+    let aliases = manifest.aliases.as_ref().map(|rows| {
+        let alias = |row: &Placed<manifest::Alias>| {
+            let manifest::Alias { name, note, source } = row.get_ref();
+            Alias { name: name.clone(), note: note.clone(), source: source.clone() }
+        };
+        rows.iter().map(alias).collect()
+    });
+    Called {
+        maker: manifest
+            .maker
+            .as_ref()
+            .map(|maker| maker.get_ref().clone())
+            .or_else(|| Some(below?.maker.clone()))
+            .unwrap_or_default(),
+        models: models.or_else(|| Some(same?.models.clone())).unwrap_or_default(),
+        aliases: aliases.or_else(|| Some(same?.aliases.clone())).unwrap_or_default(),
+    }
 }
 
 /// A signature names its words, or gives their addresses: what a unit refuses is nothing that its profile has.

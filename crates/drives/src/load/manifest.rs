@@ -28,6 +28,12 @@ pub(super) struct Manifest {
     pub(super) name: Placed<String>,
     /// The family as its maker calls it.
     pub(super) title: Option<String>,
+    /// Who makes it.
+    pub(super) maker: Option<Placed<String>>,
+    /// What stands on drives of this family beside its name and title: `--profile` takes it too.
+    pub(super) models: Option<Vec<Placed<String>>>,
+    /// Drives of other makers that have these registers and commands.
+    pub(super) aliases: Option<Vec<Placed<Alias>>>,
     /// Whether it feeds a motor.
     pub(super) kind: Option<UnitKind>,
     /// A whole number from 1, counted up with each change; backups name it.
@@ -65,6 +71,20 @@ pub(super) struct Manifest {
     /// The bits of a register, or of a parameter by its code.
     #[serde(default)]
     pub(super) bits: BTreeMap<Placed<String>, Vec<Placed<Field>>>,
+}
+
+/// A drive with another name.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(super) struct Alias {
+    /// Its maker and its name.
+    pub(super) name: String,
+    /// How much of the family is known of it.
+    #[serde(default)]
+    pub(super) note: String,
+    /// Who says so: document and page, or repository and path.
+    pub(super) source: String,
 }
 
 /// A sister family, of which all is taken over that is not stated.

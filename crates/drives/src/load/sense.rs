@@ -10,6 +10,7 @@ use crate::entry::Access;
 use crate::parts::rules::UnitKind;
 use crate::parts::setpoint::Setpoint;
 use crate::profile::Profile;
+use crate::text::folded;
 
 /// Checks what `manifest` says of `entries`.
 pub(super) fn check(file: &File, manifest: &Manifest, entries: &Entries, problems: &mut Problems) {
@@ -68,6 +69,19 @@ fn itself(file: &File, manifest: &Manifest, problems: &mut Problems) {
     let place = line(file, &manifest.name);
     if manifest.title.as_ref().is_some_and(|title| title.trim().is_empty()) {
         problems.add(file, place, "\"title\" is empty; say what the maker calls the family");
+    }
+    let (models, aliases) = (manifest.models.iter().flatten(), manifest.aliases.iter().flatten());
+    for name in manifest.maker.iter().chain(models).filter(|name| folded(name.get_ref()).is_empty()) {
+        problems.add(file, line(file, name), format!("\"{}\" is no name of a maker or a drive", name.get_ref()));
+    }
+    for alias in aliases {
+        let told = alias.get_ref();
+        if folded(&told.name).is_empty() {
+            problems.add(file, line(file, alias), "\"name\" is empty; say what stands on the drive");
+        }
+        if told.source.trim().is_empty() {
+            problems.add(file, line(file, alias), "\"source\" is empty; name who says that it is this drive");
+        }
     }
     if manifest.source.trim().is_empty() {
         problems.add(file, place, "\"source\" is empty; name the documents that the profile was made from");

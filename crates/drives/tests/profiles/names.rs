@@ -3,6 +3,8 @@
 use drivebus_drives::{NameError, Profile, ProfileError};
 use proptest::prelude::*;
 
+use crate::folder::Folder;
+
 #[test]
 fn registers_codes_and_addresses_are_found() {
     let profile = Profile::builtin("gd350").unwrap();
@@ -81,6 +83,63 @@ fn builtin_profiles_go_by_name() {
     assert_eq!(Profile::builtin("gd305").unwrap_err(), unknown);
     for name in Profile::builtin_names() {
         assert_eq!(Profile::builtin(name).unwrap().name(), name);
+    }
+}
+
+/// What stands on a drive leads to its profile, whatever its case, blanks and signs; and to one alone.
+#[test]
+fn builtin_profiles_go_by_what_their_drives_are_called() {
+    for (called, name) in [
+        ("Schneider Altivar 312", "atv312"),
+        ("altivar-312", "atv312"),
+        ("ATV 312", "atv312"),
+        ("VFD-MS300", "ms300"),
+        ("Goodrive35-H1", "gd35-h1"),
+        ("GOODRIVE 350", "gd350"),
+        ("SINAMICS V20", "v20"),
+        ("huanyang gt", "chf100a"),
+        ("Fuling DZB200", "chf100a"),
+    ] {
+        assert_eq!(Profile::builtin(called).unwrap().name(), name, "{called}");
+    }
+    for unknown in ["", " - ", "INVT", "Altivar", "Huanyang", "GT", "ATV320", "Goodrive3500", "Goodrive600"] {
+        assert!(matches!(Profile::builtin(unknown), Err(ProfileError::Unknown { .. })), "{unknown}");
+    }
+    let folded = |name: &str| name.chars().filter(|one| one.is_alphanumeric()).collect::<String>().to_lowercase();
+    let mut homes = std::collections::BTreeMap::new();
+    for family in Profile::builtin_names() {
+        let profile = Profile::builtin(family).unwrap();
+        let called = profile.called();
+        let alone = profile.title().strip_prefix(&called.maker).unwrap();
+        let aliases = called.aliases.iter().map(|alias| &*alias.name);
+        for name in
+            [family, profile.title(), alone].into_iter().chain(called.models.iter().map(|name| &**name)).chain(aliases)
+        {
+            let other = homes.insert(folded(name), family);
+            assert!(other.is_none_or(|other| other == family), "{name} is {other:?} and {family}");
+        }
+        assert!(called.aliases.iter().all(|alias| !alias.source.is_empty() && !alias.note.is_empty()), "{family}");
+    }
+}
+
+/// A sister family has names of its own; what adds to a profile keeps them.
+#[test]
+fn names_go_with_the_family() {
+    let folder = Folder::new("called", &[]);
+    let write = |text: &str| folder.write("profile.toml", text);
+    write("name = \"mine\"\nsource = \"own\"\n[overlay]\nprofile = \"chf100a\"\n");
+    assert_eq!(folder.load().unwrap().called(), Profile::builtin("chf100a").unwrap().called());
+    let sister = "version = 1\n[extends]\nprofile = \"chf100a\"\nassumption = \"a sister\"\n";
+    write(&format!("name = \"mine\"\nsource = \"own\"\nmodels = [\"X-1\"]\n{sister}"));
+    let loaded = folder.load().unwrap();
+    let called = loaded.called();
+    assert_eq!((&*called.maker, called.models.clone(), called.aliases.len()), ("INVT", vec!["X-1".to_owned()], 0));
+    for (wrong, line) in
+        [("maker = \"-\"", 3), ("models = [\"a\", \" \"]", 3), ("[[aliases]]\nname = \"A\"\nsource = \" \"", 3)]
+    {
+        write(&format!("name = \"mine\"\nsource = \"own\"\n{wrong}\n[overlay]\nprofile = \"chf100a\"\n"));
+        let [ProfileError::Broken { line: at, .. }] = &Profile::check(&folder.0)[..] else { panic!("{wrong}") };
+        assert_eq!(*at, line, "{wrong}");
     }
 }
 

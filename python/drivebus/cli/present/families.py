@@ -28,6 +28,9 @@ class Families:
             yield {
                 "name": profile.name,
                 "title": profile.title,
+                "maker": profile.maker,
+                "models": profile.models,
+                "aliases": [alias.name for alias in profile.aliases()],
                 "kind": profile.kind,
                 **{kind: counts[kind]["total"] for kind in KINDS},
                 "verified": _printed(counts),
@@ -41,8 +44,12 @@ class Families:
             counts = profile.counts()
             share = _printed(counts)
             total = sum(counts[kind]["total"] for kind in KINDS)
-            rows.append([profile.name, profile.title, total, "" if share is None else f"{int(share * 100)} %"])
-        out.rows(["name", "title", "rows", "verified"], rows)
+            title = profile.title.removeprefix(profile.maker).strip()
+            rows.append([profile.name, profile.maker, title, total, "" if share is None else f"{int(share * 100)} %"])
+        out.rows(["name", "maker", "title", "rows", "verified"], rows)
+        for profile in self.profiles:
+            for alias in profile.aliases():
+                out.say(f"{alias.name}: take {profile.name}; `drivebus profiles show {profile.name}` says why.")
         out.say(
             "rows: registers, parameters and faults that are known. verified: those that a document of this very "
             "family prints. `drivebus profiles show NAME` counts those that are unverified and assumed, and has more."

@@ -28,6 +28,9 @@ def known(profile: drivebus.Profile) -> dict[str, Any]:
         "name": profile.name,
         "family": profile.family,
         "title": profile.title,
+        "maker": profile.maker,
+        "models": profile.models,
+        "aliases": profile.aliases(),
         "kind": profile.kind,
         "version": profile.version,
         "functions": profile.functions,
@@ -65,6 +68,8 @@ def in_words(profile: drivebus.Profile) -> Iterator[tuple[str, list[str]]]:
         [
             f"{profile.kind}, profile version {profile.version}{over}",
             f"made from: {profile.source}",
+            *([f"also called: {', '.join(profile.models)}"] if profile.models else ()),
+            *(f"{alias.name} is one, as {alias.source} has it: {alias.note}" for alias in profile.aliases()),
         ],
     )
     yield "Line", _line(profile)
