@@ -11,6 +11,7 @@ mod sharing;
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::{env, fs};
 
 /// Where the programs of a test meet. It says that this is a process of a test's own.
@@ -19,6 +20,9 @@ const FOLDER: &str = "DRIVEBUS_TESTS_FOLDER";
 const OVER_LOOPBACK: &str = "DRIVEBUS_TESTS_OVER_LOOPBACK";
 /// What says in which folder the programs of a user meet.
 const USERS_FOLDER: &str = if cfg!(windows) { "LOCALAPPDATA" } else { "DRIVEBUS_RUNTIME_DIR" };
+
+/// How many folders this process made: several tests run at once in it, and their names would make the path of a socket too long.
+static FOLDERS: AtomicUsize = AtomicUsize::new(0);
 
 /// Runs `body` in each way: the body of the test that is called `name`.
 fn in_each_way(name: &str, body: impl FnOnce(&Path)) {
@@ -35,8 +39,9 @@ fn in_ways(ways: &[bool], name: &str, body: impl FnOnce(&Path)) {
     if let Some(folder) = env::var_os(FOLDER) {
         return body(Path::new(&folder));
     }
-    for (way, &is_over_loopback) in ways.iter().enumerate() {
-        let folder = env::temp_dir().join(format!("drivebus-share-{}-{way}", std::process::id()));
+    for &is_over_loopback in ways {
+        let number = FOLDERS.fetch_add(1, Ordering::Relaxed);
+        let folder = env::temp_dir().join(format!("drivebus-share-{}-{number}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let mut again = this_program(name);
         again.env(FOLDER, &folder).env(USERS_FOLDER, &folder).env(port::PORT, port::unused().to_string());
