@@ -6,10 +6,13 @@ Every example row is `assumed`: it says how a row looks, and nothing can be sent
 from __future__ import annotations
 
 import re
+import tempfile
+from pathlib import Path
 
 import drivebus
+from drivebus.cli.manual_table import ManualTable
 
-__all__ = ["family_name", "files"]
+__all__ = ["family_name", "files", "files_of_table"]
 
 _REGISTERS = "address,name,label,unit,scale,signed,words,low,high,high_from,variant,access,verified,note,source\n"
 _PARAMETERS = (
@@ -201,3 +204,26 @@ def files(folder: str, *, like: str | None = None, overlay: str | None = None) -
         "faults.csv": _FAULTS + _EXAMPLE_FAULT * filled,
         _SCHEMA: drivebus.Profile.schema(),
     }
+
+
+def files_of_table(folder: str, table: ManualTable, source: str) -> dict[str, str]:
+    """The files of a new profile in *folder* whose registers are those of *table*, by *source*: document and page.
+
+    What the loader does not take of a row goes into its note. A row that it does not take at all is left out.
+    *table* tells both.
+    """
+    written = files(folder) | {"parameters.csv": _PARAMETERS, "faults.csv": _FAULTS}
+    if any(row.table == "input" for row in table.rows):
+        written["profile.toml"] = written["profile.toml"].replace("functions = [0x03, ", "functions = [0x03, 0x04, ")
+    while True:
+        written["registers.csv"] = table.csv(source)
+        with tempfile.TemporaryDirectory(prefix="drivebus-profile-") as place:
+            for name, text in written.items():
+                Path(place, name).write_text(text, encoding="utf-8", newline="\n")
+            problems = drivebus.Profile.check(place)
+        # The template has no mistake of its own.
+        wrong = {problem["line"]: problem["reason"] for problem in problems if problem["line"] is not None}
+        if not wrong:
+            return written
+        for line, reason in sorted(wrong.items(), reverse=True):
+            table.give_up(line, reason)

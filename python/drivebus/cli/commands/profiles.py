@@ -9,6 +9,7 @@ import click
 import drivebus
 from drivebus.cli import profile_template
 from drivebus.cli.halts_elsewhere import started_by
+from drivebus.cli.manual_table import COUNTS, ManualTable
 from drivebus.cli.names import complete_profile
 from drivebus.cli.option_types import Place
 from drivebus.cli.present.families import KINDS, Families, FamilyRules, Mistakes
@@ -76,16 +77,41 @@ def _warn(profile: drivebus.Profile) -> None:
 @click.option(
     "--overlay", metavar="FAMILY", shell_complete=complete_profile, help="Add facts to this family's profile."
 )
+@click.option(
+    "--table",
+    type=Place(path_type=Path),
+    help="The manual's table of registers, as a spreadsheet saves it: its rows are taken.",
+)
+@click.option("--source", metavar="TEXT", help="Where the table is printed: manual, edition, page.")
+@click.option("--addresses", type=click.Choice(COUNTS), help="How the table writes addresses, where they do not tell.")
 @pass_session
-def new(session: Session, folder: Path, like: str | None, overlay: str | None) -> None:
-    """Start a profile: write its files, with comments that explain them. Nothing is overwritten."""
-    if like is not None and overlay is not None:
-        raise WrongUse("give --like or --overlay, not both: a profile is either a copy or an overlay")
+def new(
+    session: Session,
+    folder: Path,
+    like: str | None,
+    overlay: str | None,
+    table: Path | None,
+    source: str | None,
+    addresses: str | None,
+) -> None:
+    """Start a profile: write its files, with comments that explain them. Nothing is overwritten.
+
+    With --table its registers are those of a manual's table. Each row that could not be read is named, with the reason.
+    """
+    if (like is not None) + (overlay is not None) + (table is not None) > 1:
+        raise WrongUse("give one of --like, --overlay and --table: a profile is a copy, an overlay, or new")
+    if (table is None) != (source is None) or (table is None and addresses is not None):
+        raise WrongUse("give --table with --source, the manual and its page: each row names where it is printed")
     base = like or overlay
     if base is not None:
         drivebus.Profile.builtin(base)
     try:
-        written = profile_template.files(folder.resolve().name, like=like, overlay=overlay)
+        name = folder.resolve().name
+        read = None if table is None else ManualTable(table.read_bytes(), count=addresses)
+        if read is None or source is None:
+            written = profile_template.files(name, like=like, overlay=overlay)
+        else:
+            written = profile_template.files_of_table(name, read, source)
         there = [name for name in written if (folder / name).exists() or (folder / name).is_symlink()]
         if there:
             raise WrongUse(f"{folder} has {', '.join(there)} already; nothing was written")
@@ -95,9 +121,23 @@ def new(session: Session, folder: Path, like: str | None, overlay: str | None) -
                 file.write(text)
     except OSError as error:
         raise WrongUse(f"{error.filename or folder}: {error.strerror or error}") from error
-    session.out.record({"folder": str(folder), "files": list(written)})
+    told = {} if read is None else {"rows": len(read.rows), "left_out": [list(each) for each in sorted(read.left_out)]}
+    session.out.record({"folder": str(folder), "files": list(written), **told})
     session.out.say(f"{folder}: {', '.join(written)}")
+    if read is not None:
+        _tell(session, read)
     session.out.say(f"Fill them in, then: drivebus profiles check {folder}")
+
+
+def _tell(session: Session, table: ManualTable) -> None:
+    """What of *table* was taken, and what was not."""
+    rows = "1 row" if len(table.rows) == 1 else f"{len(table.rows)} rows"
+    session.out.say(f"{rows} of the table stand in registers.csv. Compare each with the manual: name, scale, range.")
+    for row in table.rows:
+        if row.notes:
+            session.out.say(f"line {row.line}, {row.name}: {'; '.join(row.notes)}")
+    for line, why in sorted(table.left_out):
+        remark(f"line {line} is left out: {why}")
 
 
 @profiles.command()

@@ -1,0 +1,136 @@
+"""`drivebus profiles new --table`: a manual's table becomes registers, and what may mean two things is asked for."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from hypothesis import given
+from hypothesis import strategies as st
+
+import drivebus
+from drivebus.cli import cli
+from drivebus.cli.manual_table import ManualTable
+
+ACME = """\
+Register address,Function description,Unit,Range,R/W
+2000H,Control command (1: run; 5: stop),,1-8,W
+2001H,Frequency setpoint,0.01Hz,0.00-400.00,R/W
+2100H,Drive state,,,R
+3001H,Bus voltage,0.1V,"0,0~2000,0",R
+3002H,Torque,0.1%,-250.0 to 250.0,R
+3003H-3005H,Reserved,,,
+3001H,Bus voltage again,,,R
+3007H,Current,0.05A,0-10,R
+3008H,Bus voltage,V,,R
+"""
+"""As many Chinese manuals print it; the decimal commas are those of a spreadsheet in German."""
+
+
+def new(folder: Path, text: str | bytes, *options: str) -> Result:
+    file = folder / "table.csv"
+    file.write_bytes(text.encode() if isinstance(text, str) else text)
+    line = ["profiles", "new", str(folder / "acme"), "--table", str(file), "--source", "A1 manual, p. 42", *options]
+    return CliRunner().invoke(cli, line)
+
+
+def rows(folder: Path) -> list[dict[str, str]]:
+    with (folder / "acme/registers.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_table_becomes_registers(tmp_path: Path) -> None:
+    done = new(tmp_path, ACME)
+    assert done.exit_code == 0, done.output
+    profile = drivebus.Profile.load(tmp_path / "acme")
+    told = {
+        row.name: (row.address, row.unit, row.scale, row.signed, row.low, row.high, row.access)
+        for row in map(profile.describe, profile.names())
+    }
+    assert told == {
+        "control_command": (0x2000, "", 1, False, 1, 8, "wo"),
+        "frequency_setpoint": (0x2001, "Hz", 100, False, 0.0, 400.0, "rw"),
+        "drive_state": (0x2100, "", 1, False, None, None, "ro"),
+        "bus_voltage": (0x3001, "V", 10, False, 0.0, 2000.0, "ro"),
+        "torque": (0x3002, "%", 10, True, -250.0, 250.0, "ro"),
+        "current": (0x3007, "raw", 1, False, None, None, "ro"),
+        "bus_voltage_2": (0x3008, "raw", 1, False, None, None, "ro"),
+    }
+    by_name = {row["name"]: row for row in rows(tmp_path)}
+    assert {row["source"] for row in by_name.values()} == {"A1 manual, p. 42"}
+    assert by_name["control_command"]["label"] == "Control command (1: run; 5: stop)"
+    # A step of 0.05 A is no scale, and a voltage whose step is not printed has none: both are counts.
+    assert (by_name["current"]["scale"], by_name["bus_voltage_2"]["scale"]) == ("", "")
+    assert by_name["current"]["note"] == "the table has steps of 0.05; the table has the range 0-10"
+    assert 'line 7 is left out: "3003H-3005H" is no address of one register' in done.stderr
+    assert "line 8 is left out: its address is that of line 5" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("titles", "cells", "options", "wanted"),
+    [
+        ("Address (Hex),Name", "2100,State", [], ("holding", 0x2100)),
+        ("Addr. (dec),Name", "2100,State", [], ("holding", 2100)),
+        ("Modbus address,Name", "2100,State", ["--addresses", "hex"], ("holding", 0x2100)),
+        ("Modbus address,Name", "2100,State", ["--addresses", "decimal"], ("holding", 2100)),
+        ("Register,Name", "40001,State", [], ("holding", 0)),
+        ("Register,Name", "30017,State", [], ("input", 16)),
+        ("Register,Name", "402101,State", [], ("holding", 2100)),
+        ("Address;Meaning", "0x1A;State", [], ("holding", 0x1A)),
+        ("Address\tDescription", "1Ah\tState", [], ("holding", 0x1A)),
+    ],
+)
+def test_addresses_as_manuals_write_them(
+    tmp_path: Path, titles: str, cells: str, options: list[str], wanted: tuple[str, int]
+) -> None:
+    done = new(tmp_path, f"{titles}\n{cells}\n", *options)
+    assert done.exit_code == 0, done.output
+    [row] = rows(tmp_path)
+    assert (row["table"], int(row["address"], 16)) == wanted
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        ("Address,Name\n2100,State\n", [], "may be hexadecimal or decimal"),
+        ("Place,Name\n2100H,State\n", [], "no column of the table is an address: its first line has 'Place', 'Name'"),
+        ("Address,Remark\n2100H,State\n", [], "no column of the table is a name"),
+        ("", [], "its first line has nothing"),
+        (ACME, ["--like", "gd350"], "give one of --like, --overlay and --table"),
+    ],
+)
+def test_what_may_mean_two_things_is_asked_for(tmp_path: Path, text: str, options: list[str], said: str) -> None:
+    done = new(tmp_path, text, *options)
+    assert (done.exit_code, said in done.stderr) == (2, True), done.stderr
+    assert not (tmp_path / "acme").exists()
+
+
+def test_a_row_says_where_it_is_printed(tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text(ACME)
+    line = ["profiles", "new", str(tmp_path / "acme"), "--table", str(tmp_path / "table.csv")]
+    done = CliRunner().invoke(cli, line)
+    assert (done.exit_code, "give --table with --source" in done.stderr) == (2, True)
+    assert not (tmp_path / "acme").exists()
+
+
+def test_a_range_that_does_not_fit_its_step_is_left_to_the_note(tmp_path: Path) -> None:
+    text = "Address,Name,Unit,Range\n2001H,Setpoint,0.1Hz,0.00-400.05\n2002H,Percent,0.01%,5-1\n2003H,Big,1V,0-99999\n"
+    assert new(tmp_path, text).exit_code == 0
+    assert [(row["low"], row["high"], row["note"]) for row in rows(tmp_path)] == [
+        ("", "", "the table has the range 0.00 to 400.05"),
+        ("", "", "the table has the range 5 to 1"),
+        ("", "", "the table has the range 0 to 99999"),
+    ]
+
+
+@given(st.lists(st.lists(st.text(max_size=12), min_size=2, max_size=6), max_size=12))
+def test_no_table_brings_it_down(cells: list[list[str]]) -> None:
+    text = "Address (hex),Name,Unit,Range,R/W\n" + "\n".join(",".join(row) for row in cells)
+    try:
+        table = ManualTable(text.encode("utf-8", "surrogatepass"))
+    except (drivebus.NotAllowed, drivebus.BadArgument):
+        return
+    places = [(row.table, row.address) for row in table.rows]
+    assert len(places) == len({*places}) == len({row.name for row in table.rows})
