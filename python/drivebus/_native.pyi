@@ -722,7 +722,8 @@ class Unit:
 
     `"not_ready"`: `"may_not"`, `"unseen"`, `"unstoppable"`; `"bad_link"`, how many of the last exchanges were good and
     how many there were, and how many looks failed of how many; `"settings"`, what it does otherwise (`"words"`,
-    `"commands"`, `"speed"`) and settings; `"in_fault"`, `"no_voltage"`, `"other_source"`, `"turning"` and a look.
+    `"commands"`, `"speed"`) and settings; `"in_fault"`, `"no_voltage"`, `"unknown_state"`, `"other_source"`,
+    `"turning"` and a look.
 
     `"not_set"`: `"no_register"`, `"may_not"`; `"not_settled"` as below; `"not_in_hz"` and the unit; `"above"`, a
     parameter and its value; `"not_written"`. `"not_settled"`: `"unproved"` or `"unreadable"` and the variant;

@@ -169,6 +169,7 @@ Why: TypeAlias = Literal[
     "",
     "fault",
     "no_voltage",
+    "unknown_state",
     "turning",
     "control_source",
     "settings",
@@ -287,7 +288,8 @@ class NotReady(NotAllowed):
 
     Attributes:
         why: What stands against it. `"fault"`: the drive is in fault. `"no_voltage"`: its DC bus has none.
-            `"turning"`: its motor turns. `"control_source"`: its commands come from elsewhere. `"settings"`: a
+            `"unknown_state"`: its state word is none that its family has. `"turning"`: its motor turns.
+            `"control_source"`: its commands come from elsewhere. `"settings"`: a
             parameter must be set, which the message names. `"read_only"`: the bus is for reading only.
             `"being_stopped"`: the drive is being stopped for a program that is gone. `"halted"`: somebody told it to
             stop meanwhile. `"ending"`: the program ends.

@@ -60,6 +60,9 @@ pub enum NotReady<E> {
     /// It has no voltage on its DC bus.
     #[error("it has no voltage on its DC bus")]
     NoVoltage(Look),
+    /// Its state word is none that its family has: it may be another drive, or do what nobody knows.
+    #[error("its state word {:04X}H is none of its family", .0.word.unwrap_or_default())]
+    UnknownState(Look),
     /// It takes its commands from elsewhere, as it says.
     #[error("it takes its commands from the {}, not from the bus", .0.other_source().unwrap_or_default())]
     OtherSource(Look),
@@ -153,6 +156,9 @@ impl Unit {
         }
         if look.state == State::PowerOff {
             return Err(NotReady::NoVoltage(look));
+        }
+        if look.state == State::Unknown && look.word.is_some() {
+            return Err(NotReady::UnknownState(look));
         }
         if by_bus && look.other_source().is_some() {
             return Err(NotReady::OtherSource(look));

@@ -85,6 +85,7 @@ pub(crate) fn ready_told(py: Python<'_>, why: NotReady<Failed>) -> PyResult<Told
         }
         NotReady::InFault(look) => ("in_fault", shown(look).into_py_any(py)?),
         NotReady::NoVoltage(look) => ("no_voltage", shown(look).into_py_any(py)?),
+        NotReady::UnknownState(look) => ("unknown_state", shown(look).into_py_any(py)?),
         NotReady::OtherSource(look) => ("other_source", shown(look).into_py_any(py)?),
         NotReady::Turning(look) => ("turning", shown(look).into_py_any(py)?),
         NotReady::Failed(error) => return Err(error.into()),

@@ -66,6 +66,17 @@ def in_words(unit: DriveView, command: str | None, kind: str, told: Any) -> Driv
             why="no_voltage",
             unit=unit.address,
         )
+    if kind == "unknown_state":
+        return NotReady(
+            Text(
+                f"the state word of unit {unit.address} is {seen.word:04X}H, and {unit.profile.title} has no such "
+                "state; nothing that moves it was sent. Look whether it is such a drive: ",
+                call("identify"),
+                " asks it",
+            ),
+            why="unknown_state",
+            unit=unit.address,
+        )
     if kind == "other_source":
         return NotReady(
             Text(

@@ -251,6 +251,10 @@ fn what_is_not_ready_gets_nothing() {
     let gd350_with = |words: &[(u16, u16)], start_so| not_ready(&gd350().with(words), start_so);
     assert!(matches!(gd350_with(&[(0x2100, 4), (0x2102, 3)], run), NotReady::InFault(look) if look.fault == Some(3)));
     assert!(matches!(gd350_with(&[(0x2100, 5)], run), NotReady::NoVoltage(_)));
+    for word in [0, 7, 0xFFFF] {
+        let told = gd350_with(&[(0x2100, word)], run);
+        assert!(matches!(told, NotReady::UnknownState(look) if look.word == Some(word)), "{word}");
+    }
     let by_keypad = gd350_with(&[(0x2101, 0x00)], run);
     assert!(matches!(by_keypad, NotReady::OtherSource(look) if look.other_source() == Some("keypad")));
     assert!(matches!(gd350_with(&[(0x2100, 1)], Start::jog(false)), NotReady::Turning(_)));
