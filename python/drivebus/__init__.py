@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     )
     from drivebus.gateway import Allow, Gateway, GatewayStats
     from drivebus.identify.results import Found, Identification
+    from drivebus.line.device import DeviceIdentification
     from drivebus.line.poll_samples import Batch, Sample
     from drivebus.line.serial_ports import SerialPort, ports
     from drivebus.line.stats import Link, Stats
@@ -92,6 +93,7 @@ __all__ = [
     "ControlSource",
     "CrcError",
     "Description",
+    "DeviceIdentification",
     "Diff",
     "Difference",
     "Discovery",
@@ -183,6 +185,7 @@ if not TYPE_CHECKING:
                 "WrongDrive",
             ),
             "identify.results": ("Found", "Identification"),
+            "line.device": ("DeviceIdentification",),
             "line.serial_ports": ("SerialPort", "ports"),
             "line.poll_samples": ("Batch", "Sample"),
             "line.stats": ("Link", "Stats"),

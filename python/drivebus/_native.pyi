@@ -137,6 +137,9 @@ def decode(frame: Buffer) -> dict[str, Any]:
     `"read_answer"`, `"write_many_answer"`, `"exception"`, `"other"`. Raises CrcError, BadAnswer.
     """
 
+def device_objects(pdu: bytes, /) -> list[tuple[int, bytes]] | None:
+    """The objects of one answer to 2BH/0EH, by their numbers; None of any other PDU."""
+
 def touched(pdu: Buffer, /) -> tuple[int, int, list[int] | None] | None:
     """What the request *pdu* reads or writes: the first place, how many, and the words that it writes.
 
@@ -411,10 +414,12 @@ class Bus:
         *,
         timeout: float | None = None,
         in_doubt: bool = False,
+        retries: int | None = 0,
     ) -> bytes:
         """Any PDU out, the answer's PDU back. *reply_length* is the length of that PDU, if known.
 
-        *in_doubt*: also to a unit that may still owe another answer. What comes may be that.
+        *in_doubt*: also to a unit that may still owe another answer. What comes may be that. *retries*: how often an
+        identification is asked for once more; anything else is sent once. None: as often as a read of this bus.
         """
     def stats(self) -> dict[str, Any]:
         """`{"requests": …, …, "hints": ["…"], "hint_names": ["no_bias"], "units": {1: {…}}}`.
@@ -501,6 +506,7 @@ class Requests:
         *,
         timeout: float | None = None,
         in_doubt: bool = False,
+        retries: int | None = 0,
     ) -> Asked[bytes]: ...
     def halts(self, unit: int, /) -> Asked[int]: ...
     def link(self, unit: int, /) -> Asked[tuple[int, int]]: ...
@@ -810,6 +816,20 @@ class Values:
         """Gives a setpoint, if the drive heeds it. Or `"not_given"`."""
     def set_bits(self, setpoint: str, fields: Sequence[tuple[str, bool | int | str]], force: bool, /) -> Task:
         """Sets bits of a word, over a bad link too where *force*. Or `"not_set_bits"`, `"not_commanded"`."""
+
+@final
+class DeviceQuestion:
+    """What to ask a unit next for its identification (2BH/0EH)."""
+
+    def __new__(cls) -> DeviceQuestion: ...
+    def pdu(self) -> bytes | None:
+        """The PDU to ask with now; None once it is known."""
+    def heard(self, pdu: bytes, /) -> None:
+        """The unit gave this answer."""
+    def refused(self, code: int, /) -> bool:
+        """The unit refused; whether there is something less to ask for."""
+    def told(self) -> tuple[int, bool, list[str | None], dict[int, bytes]]:
+        """What came: conformity, whether that is all, the first seven objects as text, and all as bytes."""
 
 @final
 class BusTimeout:

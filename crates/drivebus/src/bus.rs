@@ -6,7 +6,10 @@ use std::time::Duration;
 
 use drivebus_drive::Record;
 use drivebus_drives::Place;
-use drivebus_line::{Bus as Core, CallOptions as LineOptions, Done, Link, Stats, UnitOptions, Watch};
+use drivebus_line::{
+    Bus as Core, CallOptions as LineOptions, DeviceIdentification, DeviceQuestion, Done, Link, Stats, UnitOptions,
+    Watch,
+};
 use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::checks;
@@ -149,6 +152,25 @@ impl Bus {
         let (unit, request) = (checks::unit(unit)?, Request::echo(self.core.fresh_word()));
         let done = self.call(unit.into(), &request, LineOptions::default(), &mut |_| ())?;
         Ok(done.ended.saturating_duration_since(done.sent))
+    }
+
+    /// Who made `unit` and what it is, as it says itself (2BH/0EH). What does not fit into one answer is asked for by
+    /// more requests, 32 at most.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`]: most units do not know the function, and refuse it with 01H. Nothing of the unit changed.
+    pub fn device_identification(&self, unit: u8) -> Result<DeviceIdentification, Error> {
+        let unit = checks::unit(unit)?;
+        let mut question = DeviceQuestion::new();
+        while let Some(request) = question.request() {
+            let answer = &mut |answer: Answer<'_>| question.answered(&answer);
+            let done = self.call(unit.into(), &request, LineOptions::default(), answer);
+            if let Err(error) = done {
+                replies::asks_less(&mut question, error)?;
+            }
+        }
+        Ok(question.told())
     }
 
     /// Sends any PDU (1..=253 bytes, the function code first) and returns the answer's PDU. Sent once.

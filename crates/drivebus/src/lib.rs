@@ -121,7 +121,7 @@ pub use drive::{FieldInput, Frequencies, Look, OnSilence, Setting, Start};
 pub use drives::{Fault, Input, Profile, Setpoint, State, Store, Value};
 #[cfg(feature = "serial")]
 pub use line::rs485::Rs485;
-pub use line::{AdapterEcho, ErrorKind, Link, Opener, Share, Stats, UnitOptions};
+pub use line::{AdapterEcho, DeviceIdentification, ErrorKind, Link, Opener, Share, Stats, UnitOptions};
 pub use rtu::{DataBits, Instant, Parity, SerialFormat, Silence, StopBits};
 #[cfg(feature = "sim")]
 pub use sim::Simulator;

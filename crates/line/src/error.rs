@@ -126,6 +126,19 @@ impl fmt::Display for Asked<'_> {
                 write!(f, "write {} words from {address:04X}H", words.len())
             }
             Request::Echo { data, .. } => write!(f, "echo {data:04X}H"),
+            Request::WriteCoils { address, words, .. } => {
+                write!(f, "write {} coils from {address:04X}H", words.len())
+            }
+            Request::MaskWrite { address, and, or, .. } => {
+                write!(f, "change bits of {address:04X}H (and {and:04X}H, or {or:04X}H)")
+            }
+            Request::ReadWrite { address, count, write_address, words, .. } => {
+                write!(f, "write {} words from {write_address:04X}H and read {count} from {address:04X}H", words.len())
+            }
+            Request::ReportServerId => f.write_str("report what it is (11H)"),
+            Request::ReadIdentification { object, .. } => {
+                write!(f, "read its identification (2BH/0EH) from object {object:02X}H")
+            }
             _ => write!(f, "PDU {}", Hex(self.pdu)),
         }
     }

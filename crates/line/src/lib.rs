@@ -57,6 +57,7 @@
 //! | --- | --- |
 //! | `line`, `error` | what every kind of line promises; what can become of a call |
 //! | `by_unit` | what is kept of each unit |
+//! | `device` | who made a unit, by its own words |
 //! | `system` | what is asked of the machine: the time, waits that end on time, whose process this is, forked children |
 //! | `turns` | whose turn it is: the order of those who wait, their queue, and the crew for work without a thread |
 //! | `trace` | the frames on a line, for whoever watches it |
@@ -72,6 +73,7 @@
 mod ask;
 mod bus;
 mod by_unit;
+mod device;
 mod error;
 #[cfg(feature = "tcp")]
 pub mod gateway;
@@ -93,6 +95,7 @@ pub use ask::Done;
 pub use bus::Bus;
 pub use bus::errand::{Errand, Reply};
 pub use bus::workers::Running;
+pub use device::{DeviceIdentification, DeviceQuestion};
 pub use error::kind::ErrorKind;
 pub use error::{CallError, Failure};
 pub use health::hint::{By, Hint};

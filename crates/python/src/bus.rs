@@ -222,7 +222,8 @@ impl Bus {
         Ok(done.ended.saturating_duration_since(done.sent).as_secs_f64())
     }
 
-    #[pyo3(signature = (unit, pdu, reply_length = None, /, *, timeout = None, in_doubt = false))]
+    #[pyo3(signature = (unit, pdu, reply_length = None, /, *, timeout = None, in_doubt = false, retries = Some(0)))]
+    #[expect(clippy::too_many_arguments, reason = "they are Python's")]
     fn transact<'py>(
         &self,
         py: Python<'py>,
@@ -231,9 +232,10 @@ impl Bus {
         reply_length: Option<u8>,
         timeout: Option<f64>,
         in_doubt: bool,
+        retries: Option<u32>,
     ) -> PyResult<Bound<'py, PyBytes>> {
         let (unit, pdu) = (any_unit(unit)?, bytes_of(pdu)?);
-        let options = read_options(timeout, Some(0), false)?.in_doubt(in_doubt);
+        let options = read_options(timeout, retries, false)?.in_doubt(in_doubt);
         let pdu = pdu.as_bytes();
         let request = Request::raw(pdu, reply_length).map_err(refuse)?;
         let mut reply = Vec::new();

@@ -12,6 +12,7 @@ mod bus;
 mod bus_timeout;
 mod clock;
 mod convert;
+mod device;
 mod ending;
 mod errors;
 mod family;
@@ -59,6 +60,8 @@ mod _native {
     use crate::bus::Bus;
     #[pymodule_export]
     use crate::bus_timeout::BusTimeout;
+    #[pymodule_export]
+    use crate::device::{DeviceQuestion, device_objects};
     #[pymodule_export]
     use crate::ending::{begin_of_child, end_of_program};
     #[pymodule_export]

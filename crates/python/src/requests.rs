@@ -197,7 +197,7 @@ impl Requests {
         })
     }
 
-    #[pyo3(signature = (unit, pdu, reply_length = None, /, *, timeout = None, in_doubt = false))]
+    #[pyo3(signature = (unit, pdu, reply_length = None, /, *, timeout = None, in_doubt = false, retries = Some(0)))]
     fn transact(
         &self,
         unit: &Bound<'_, PyAny>,
@@ -205,9 +205,10 @@ impl Requests {
         reply_length: Option<u8>,
         timeout: Option<f64>,
         in_doubt: bool,
+        retries: Option<u32>,
     ) -> PyResult<Asked> {
         let request = Request::raw(pdu.as_bytes(), reply_length).map_err(refuse)?;
-        let options = read_options(timeout, Some(0), false)?.in_doubt(in_doubt);
+        let options = read_options(timeout, retries, false)?.in_doubt(in_doubt);
         Ok(self
             .ask(any_unit(unit)?.into(), &request, options, |py, reply, _| Ok(PyBytes::new(py, &reply.pdu).into_any())))
     }

@@ -3,8 +3,10 @@
 mod error;
 mod head;
 
+use crate::identification::IdentificationPage;
 use crate::pdu::function::{
-    DIAGNOSTICS, EXCEPTION_BIT, READ_COILS, READ_HOLDING, READ_INPUT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE,
+    DIAGNOSTICS, ENCAPSULATED, EXCEPTION_BIT, MASK_WRITE, READ_COILS, READ_HOLDING, READ_INPUT, READ_WRITE,
+    REPORT_SERVER_ID, WRITE_COIL, WRITE_COILS, WRITE_MULTIPLE, WRITE_SINGLE,
 };
 use crate::pdu::{ExceptionCode, MAX_PDU, MAX_READ, MAX_READ_BITS, coil_of, coil_word, put_words};
 use crate::request::{Request, RequestError};
@@ -57,6 +59,42 @@ pub enum Answer<'a> {
         /// How many words.
         count: u16,
     },
+    /// Several coils were written.
+    #[non_exhaustive]
+    WriteCoils {
+        /// First coil.
+        address: u16,
+        /// How many.
+        count: u16,
+    },
+    /// What the unit is, in bytes of its own: by the specification its identifier, 00H or FFH for off or on, and what it likes.
+    #[non_exhaustive]
+    ServerId {
+        /// 1..=251 bytes.
+        data: &'a [u8],
+    },
+    /// Bits of a register were changed.
+    #[non_exhaustive]
+    MaskWrite {
+        /// Register.
+        address: u16,
+        /// Bits that stayed.
+        and: u16,
+        /// Bits that were set where `and` has zeros.
+        or: u16,
+    },
+    /// The words read, after others were written.
+    #[non_exhaustive]
+    ReadWrite {
+        /// 1..=125 words.
+        words: Words<'a>,
+    },
+    /// Objects of the unit's identification.
+    #[non_exhaustive]
+    Identification {
+        /// Those of this answer.
+        page: IdentificationPage<'a>,
+    },
     /// The unit refused.
     #[non_exhaustive]
     Exception {
@@ -96,6 +134,30 @@ impl<'a> Answer<'a> {
         Ok(Self::Read { table, words: Words::new(words) })
     }
 
+    /// The answer to 17H: the words that were read.
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError::Count`]: `words` are none or more than 125.
+    pub const fn read_write(words: &'a [u16]) -> Result<Self, RequestError> {
+        if words.is_empty() || words.len() > MAX_READ as usize {
+            return Err(RequestError::Count { count: words.len(), max: MAX_READ });
+        }
+        Ok(Self::ReadWrite { words: Words::new(words) })
+    }
+
+    /// The answer to 11H: 1..=251 bytes.
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError::PduLength`]: `data` is empty or longer than that.
+    pub const fn server_id(data: &'a [u8]) -> Result<Self, RequestError> {
+        if data.is_empty() || data.len() > MAX_PDU - 2 {
+            return Err(RequestError::PduLength { len: 2 + data.len() });
+        }
+        Ok(Self::ServerId { data })
+    }
+
     /// The refusal of `function` (its low seven bits).
     pub const fn exception(function: u8, code: ExceptionCode) -> Self {
         Self::Exception { function: function & !EXCEPTION_BIT, code }
@@ -122,7 +184,7 @@ impl<'a> Answer<'a> {
         }
     }
 
-    /// The answer that confirms `request`; `None` for a read and a custom request, whose answers carry data.
+    /// The answer that confirms `request`; `None` where the answer carries data, and for a custom request.
     pub fn confirming(request: &Request<'_>) -> Option<Self> {
         match *request {
             Request::WriteCoil { address, on } => Some(Self::WriteCoil { address, on }),
@@ -132,7 +194,16 @@ impl<'a> Answer<'a> {
                 let count = u16::try_from(words.len()).ok()?;
                 Some(Self::WriteMultiple { address, count })
             }
-            Request::Read { .. } | Request::Custom { .. } => None,
+            Request::WriteCoils { address, words } => {
+                let count = u16::try_from(words.len()).ok()?;
+                Some(Self::WriteCoils { address, count })
+            }
+            Request::MaskWrite { address, and, or } => Some(Self::MaskWrite { address, and, or }),
+            Request::Read { .. }
+            | Request::ReportServerId
+            | Request::ReadWrite { .. }
+            | Request::ReadIdentification { .. }
+            | Request::Custom { .. } => None,
         }
     }
 
@@ -175,7 +246,29 @@ impl<'a> Answer<'a> {
             | [DIAGNOSTICS, 0, 0, ..] => Err(AnswerError::Length { len: pdu.len() }),
             [function, ..] if function & EXCEPTION_BIT != 0 => Err(AnswerError::Length { len: pdu.len() }),
             _ if pdu.len() > MAX_PDU => Err(AnswerError::Length { len: pdu.len() }),
-            _ => Ok(Self::Custom { pdu }),
+            _ => Ok(Self::seldom(pdu).unwrap_or(Self::Custom { pdu })),
+        }
+    }
+
+    /// The answer of a function that few units know, if it is as the specification has it.
+    #[cold]
+    fn seldom(pdu: &'a [u8]) -> Option<Self> {
+        match *pdu {
+            [WRITE_COILS, a1, a0, c1, c0] => {
+                Some(Self::WriteCoils { address: u16::from_be_bytes([a1, a0]), count: u16::from_be_bytes([c1, c0]) })
+            }
+            [REPORT_SERVER_ID, bytes, ref data @ ..] if usize::from(bytes) == data.len() => Self::server_id(data).ok(),
+            [MASK_WRITE, a1, a0, n1, n0, o1, o0] => Some(Self::MaskWrite {
+                address: u16::from_be_bytes([a1, a0]),
+                and: u16::from_be_bytes([n1, n0]),
+                or: u16::from_be_bytes([o1, o0]),
+            }),
+            [READ_WRITE, bytes, ref data @ ..] if usize::from(bytes) == data.len() => {
+                let words = Words::from_wire(data)?;
+                (1..=MAX_READ.into()).contains(&words.len()).then_some(Self::ReadWrite { words })
+            }
+            [ENCAPSULATED, ..] => IdentificationPage::parse(pdu).ok().map(|page| Self::Identification { page }),
+            _ => None,
         }
     }
 
@@ -210,6 +303,38 @@ impl<'a> Answer<'a> {
                 target[..pdu.len()].copy_from_slice(pdu);
                 pdu.len()
             }
+            _ => self.put_seldom(target),
+        }
+    }
+
+    /// Writes the PDU of a function that few units know into `target`, and returns its length.
+    #[cold]
+    #[expect(clippy::cast_possible_truncation, reason = "at most 251 bytes: checked by the constructors")]
+    fn put_seldom(&self, target: &mut [u8; MAX_PDU]) -> usize {
+        match *self {
+            Self::WriteCoils { address, count } => put_words(target, WRITE_COILS, [address, count]),
+            Self::MaskWrite { address, and, or } => {
+                put_words(target, MASK_WRITE, [address, and]);
+                target[5..7].copy_from_slice(&or.to_be_bytes());
+                7
+            }
+            Self::ReadWrite { words } => {
+                let bytes = 2 * words.len();
+                target[..2].copy_from_slice(&[READ_WRITE, bytes as u8]);
+                words.put(&mut target[2..2 + bytes]);
+                2 + bytes
+            }
+            Self::ServerId { data } => {
+                target[..2].copy_from_slice(&[REPORT_SERVER_ID, data.len() as u8]);
+                target[2..2 + data.len()].copy_from_slice(data);
+                2 + data.len()
+            }
+            Self::Identification { page } => {
+                let pdu = page.pdu();
+                target[..pdu.len()].copy_from_slice(pdu);
+                pdu.len()
+            }
+            _ => 0,
         }
     }
 }

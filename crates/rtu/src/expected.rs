@@ -2,12 +2,14 @@
 
 mod shape;
 
-use crate::answer::{Answer, AnswerError};
+use crate::answer::{Answer, AnswerError, Head, MOST};
 use crate::frame::Frame;
+use crate::identification::{IdentificationLevel, IdentificationPage};
 use crate::pdu::function::{
-    DIAGNOSTICS, EXCEPTION_BIT, READ_COILS, READ_INPUT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE,
+    DIAGNOSTICS, ENCAPSULATED, EXCEPTION_BIT, IDENTIFICATION, MASK_WRITE, READ_COILS, READ_INPUT, READ_WRITE,
+    REPORT_SERVER_ID, WRITE_COIL, WRITE_COILS, WRITE_MULTIPLE, WRITE_SINGLE,
 };
-use crate::pdu::{AROUND_PDU, AnswerLength, coil_word};
+use crate::pdu::{AROUND_PDU, AnswerLength, MAX_PDU, coil_word};
 use crate::request::Request;
 use crate::{Table, UnitAddress};
 use shape::Shape;
@@ -23,6 +25,11 @@ enum Kind {
     WriteSingle { address: u16, value: u16 },
     Echo { data: u16 },
     WriteMultiple { address: u16, count: u16 },
+    WriteCoils { address: u16, count: u16 },
+    ServerId,
+    MaskWrite { address: u16, and: u16, or: u16 },
+    ReadWrite { count: u16 },
+    Identification { level: IdentificationLevel, object: u8 },
     Custom { function: u8, answer: AnswerLength },
 }
 
@@ -38,6 +45,12 @@ impl Expected {
             Request::Echo { data } => Kind::Echo { data },
             #[expect(clippy::cast_possible_truncation, reason = "at most 123 words")]
             Request::WriteMultiple { address, words } => Kind::WriteMultiple { address, count: words.len() as u16 },
+            #[expect(clippy::cast_possible_truncation, reason = "at most 1968 coils")]
+            Request::WriteCoils { address, words } => Kind::WriteCoils { address, count: words.len() as u16 },
+            Request::ReportServerId => Kind::ServerId,
+            Request::MaskWrite { address, and, or } => Kind::MaskWrite { address, and, or },
+            Request::ReadWrite { count, .. } => Kind::ReadWrite { count },
+            Request::ReadIdentification { level, object } => Kind::Identification { level, object },
             Request::Custom { answer, .. } => Kind::Custom { function: request.function(), answer },
         })
     }
@@ -50,6 +63,11 @@ impl Expected {
             Kind::WriteSingle { .. } => WRITE_SINGLE,
             Kind::Echo { .. } => DIAGNOSTICS,
             Kind::WriteMultiple { .. } => WRITE_MULTIPLE,
+            Kind::WriteCoils { .. } => WRITE_COILS,
+            Kind::ServerId => REPORT_SERVER_ID,
+            Kind::MaskWrite { .. } => MASK_WRITE,
+            Kind::ReadWrite { .. } => READ_WRITE,
+            Kind::Identification { .. } => ENCAPSULATED,
             Kind::Custom { function, .. } => function,
         }
     }
@@ -74,9 +92,14 @@ impl Expected {
     pub(crate) const fn pdu_len(self) -> Option<usize> {
         match self.0 {
             Kind::Read { table, count } => Some(2 + table.bytes(count as usize)),
-            Kind::WriteCoil { .. } | Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::WriteMultiple { .. } => {
-                Some(5)
-            }
+            Kind::WriteCoil { .. }
+            | Kind::WriteSingle { .. }
+            | Kind::Echo { .. }
+            | Kind::WriteMultiple { .. }
+            | Kind::WriteCoils { .. } => Some(5),
+            Kind::MaskWrite { .. } => Some(7),
+            Kind::ReadWrite { count } => Some(2 + 2 * count as usize),
+            Kind::ServerId | Kind::Identification { .. } => None,
             Kind::Custom { answer: AnswerLength::Bytes(pdu), .. } => Some(pdu as usize),
             Kind::Custom { answer: AnswerLength::BySilence, .. } => None,
         }
@@ -89,10 +112,20 @@ impl Expected {
             Kind::Read { table, count } => Some(table.bytes(count as usize) as u8),
             Kind::WriteCoil { address, .. }
             | Kind::WriteSingle { address, .. }
-            | Kind::WriteMultiple { address, .. } => Some(address.to_be_bytes()[0]),
+            | Kind::WriteMultiple { address, .. }
+            | Kind::WriteCoils { address, .. }
+            | Kind::MaskWrite { address, .. } => Some(address.to_be_bytes()[0]),
+            #[expect(clippy::cast_possible_truncation, reason = "at most 250 bytes")]
+            Kind::ReadWrite { count } => Some(2 * count as u8),
             Kind::Echo { .. } => Some(0),
-            Kind::Custom { .. } => None,
+            Kind::Identification { .. } => Some(IDENTIFICATION),
+            Kind::ServerId | Kind::Custom { .. } => None,
         }
+    }
+
+    /// Whether nobody knows beforehand how long the answer is, and its own bytes tell.
+    pub(crate) const fn tells_its_length(self) -> bool {
+        matches!(self.0, Kind::ServerId | Kind::Identification { .. })
     }
 
     /// Whether the specification says more of the answer to `asked`, the PDU of the request: checks `pdu` against that.
@@ -121,7 +154,7 @@ impl Expected {
     /// Address and count, as the answer has to repeat them; `None` where it repeats nothing, or more.
     pub(crate) const fn repeats(self) -> Option<[u8; 4]> {
         match self.0 {
-            Kind::WriteMultiple { address, count } => {
+            Kind::WriteMultiple { address, count } | Kind::WriteCoils { address, count } => {
                 let ([a, b], [c, d]) = (address.to_be_bytes(), count.to_be_bytes());
                 Some([a, b, c, d])
             }
@@ -153,6 +186,10 @@ impl Expected {
             (Kind::Read { table: ours, .. }, Kind::Read { table: theirs, .. }) => {
                 ours == theirs && self.pdu_len() == other.pdu_len()
             }
+            // What an answer brings of several objects depends on what the unit has.
+            (Kind::Identification { level: ours, object }, Kind::Identification { level: theirs, object: other }) => {
+                ours == theirs && (ours != IdentificationLevel::One || object == other)
+            }
             _ => self == other,
         }
     }
@@ -176,9 +213,16 @@ impl Expected {
 
     /// Whether the right answer may be the request once more, so that an adapter's own echo cannot be told from it.
     ///
-    /// Always so for 05H, 06H and 08H; of a custom function nobody knows.
+    /// Always so for 05H, 06H, 08H and 16H; of a custom function nobody knows.
     pub const fn may_repeat_request(&self) -> bool {
-        matches!(self.0, Kind::WriteCoil { .. } | Kind::WriteSingle { .. } | Kind::Echo { .. } | Kind::Custom { .. })
+        matches!(
+            self.0,
+            Kind::WriteCoil { .. }
+                | Kind::WriteSingle { .. }
+                | Kind::Echo { .. }
+                | Kind::MaskWrite { .. }
+                | Kind::Custom { .. }
+        )
     }
 
     /// `frame` as the answer of `unit` that was expected, or as the refusal of it.
@@ -251,7 +295,35 @@ impl Expected {
                 repeats([address, count], [at, took], answer)
             }
             (Kind::Echo { data }, Answer::Echo { data: back }) => repeats([0, data], [0, back], answer),
-            _ => Err(AnswerError::Function { asked: self.function(), came }),
+            _ => self.judge_seldom(pdu, answer),
+        }
+    }
+
+    /// The same, of a function that few units know. `answer` is what `pdu` is by itself.
+    #[cold]
+    fn judge_seldom<'a>(&self, pdu: &'a [u8], answer: Answer<'a>) -> Result<Answer<'a>, AnswerError> {
+        match (self.0, answer) {
+            (Kind::WriteCoils { address, count }, Answer::WriteCoils { address: at, count: took }) => {
+                repeats([address, count], [at, took], answer)
+            }
+            (Kind::MaskWrite { address, and, or }, Answer::MaskWrite { .. }) => {
+                let mut asked = [0; MAX_PDU];
+                let len = Answer::MaskWrite { address, and, or }.put(&mut asked);
+                if asked[..len] == *pdu {
+                    return Ok(answer);
+                }
+                Err(AnswerError::Repeat { asked: Head::of(&asked[1..len], MOST), came: Head::of(&pdu[1..], MOST) })
+            }
+            (Kind::ReadWrite { count }, Answer::ReadWrite { words }) if words.len() == usize::from(count) => Ok(answer),
+            (Kind::ReadWrite { count }, Answer::ReadWrite { words }) => {
+                Err(AnswerError::Count { asked: count, came: words.len() })
+            }
+            (Kind::ServerId, Answer::ServerId { .. }) => Ok(answer),
+            (Kind::Identification { level, object }, _) => {
+                IdentificationPage::parse(pdu)?.check(level, object, true).map(|()| answer)
+            }
+            (_, Answer::Custom { .. }) => Err(AnswerError::Length { len: pdu.len() }),
+            (_, _) => Err(AnswerError::Function { asked: self.function(), came: pdu[0] }),
         }
     }
 }

@@ -69,6 +69,8 @@ struct Awaited {
     function: u8,
     /// Unless the unit refuses; `None` where only silence tells.
     len: Option<usize>,
+    /// Whether its own bytes tell instead.
+    tells: bool,
 }
 
 /// One step of the framer, without borrowing from it.
@@ -102,7 +104,12 @@ impl Framer {
     /// they may be, [`wait_for_the_rest`](Self::wait_for_the_rest) says.
     pub fn expect(&mut self, unit: UnitAddress, expected: Expected) {
         self.clear();
-        self.expect = Some(Awaited { unit: unit.get(), function: expected.function(), len: expected.adu_len() });
+        self.expect = Some(Awaited {
+            unit: unit.get(),
+            function: expected.function(),
+            len: expected.adu_len(),
+            tells: expected.tells_its_length(),
+        });
         self.patience = None;
         self.is_late = false;
         self.own.clear();

@@ -8,15 +8,12 @@ use core::ops::Range;
 
 use crate::answer::Answer;
 use crate::frame::Frame;
-use crate::pdu::function::{EXCEPTION_BIT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE};
-use crate::pdu::{MAX_WRITE, coil_of};
+use crate::functions::FrameLength;
+use crate::pdu::function::{EXCEPTION_BIT, WRITE_COIL, WRITE_COILS, WRITE_MULTIPLE, WRITE_SINGLE};
+use crate::pdu::{MAX_WRITE, MAX_WRITE_BITS, coil_of};
 use crate::request::Request;
-use crate::sniffer::{can_ask, may_be_answer, of_answer, of_request};
+use crate::sniffer::{can_ask, may_be_answer};
 use crate::{Table, UnitAddress};
-
-const WRITE_COILS: u8 = 0x0F;
-/// Most coils of one 0FH write.
-const MAX_WRITE_BITS: u16 = 1_968;
 
 /// What is wrong inside a frame whose CRC is right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -317,7 +314,11 @@ fn frame_at(here: &[u8]) -> Option<usize> {
         let frame = here.get(..*len).and_then(|bytes| Frame::parse(bytes).ok());
         frame.is_some_and(|frame| frame.wrong_inside().is_none())
     };
-    [of_request(here), of_answer(here)].into_iter().flatten().filter(is_whole).max()
+    [FrameLength::of_request(here), FrameLength::of_answer(here)]
+        .into_iter()
+        .filter_map(FrameLength::bytes)
+        .filter(is_whole)
+        .max()
 }
 
 #[cfg(test)]

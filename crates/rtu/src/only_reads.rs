@@ -6,15 +6,12 @@
 //!
 //! Source of the forms: *Modbus Application Protocol* V1.1b3, §6.1 to §6.4, §6.7 to §6.10, §6.13, §6.14, §6.18, §6.21.
 
-use crate::pdu::function::{DIAGNOSTICS, READ_COILS, READ_DISCRETE, READ_INPUT};
+use crate::pdu::function::{DIAGNOSTICS, ENCAPSULATED, IDENTIFICATION, READ_COILS, READ_DISCRETE, READ_INPUT};
 use crate::request::Request;
 
 /// Of a group in a request for parts of files: its type, file, record, and number of words.
 const GROUP: usize = 7;
 const GROUP_TYPE: u8 = 6;
-
-/// What 2BH carries: who the unit is.
-const IDENTIFICATION: u8 = 0x0E;
 
 impl Request<'_> {
     /// Whether the request only reads, whatever the unit makes of it: what a bus sends that is for reading only.
@@ -45,7 +42,7 @@ fn has_form_of_read(pdu: &[u8]) -> bool {
         }
         [0x14] => false,
         [0x18, ..] => pdu.len() == 3,
-        [0x2B, mei, ref rest @ ..] => mei == IDENTIFICATION && matches!(rest, [1..=4, _]),
+        [ENCAPSULATED, mei, ref rest @ ..] => mei == IDENTIFICATION && matches!(rest, [1..=4, _]),
         _ => pdu.len() == 1,
     }
 }

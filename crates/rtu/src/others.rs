@@ -18,7 +18,7 @@ use core::time::Duration;
 
 use crate::expected::Expected;
 use crate::frame::{Adu, Frame};
-use crate::pdu::function::{EXCEPTION_BIT, WRITE_MULTIPLE};
+use crate::pdu::function::{EXCEPTION_BIT, WRITE_COILS, WRITE_MULTIPLE};
 use crate::unit_set::UnitSet;
 use crate::{Instant, UnitAddress};
 
@@ -49,7 +49,7 @@ impl Shape {
         let (unit, pdu) = (frame.address(), frame.pdu());
         let (function, len, repeats) = match *pdu {
             [function, ..] if function & EXCEPTION_BIT != 0 => (function & !EXCEPTION_BIT, 0, [0; 4]),
-            [WRITE_MULTIPLE, a, b, c, d] => (WRITE_MULTIPLE, 5, [a, b, c, d]),
+            [function @ (WRITE_COILS | WRITE_MULTIPLE), a, b, c, d] => (function, 5, [a, b, c, d]),
             [function, ..] => (function, pdu.len() as u8, [0; 4]),
             [] => (0, 0, [0; 4]),
         };

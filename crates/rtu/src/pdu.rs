@@ -10,6 +10,10 @@ pub const MAX_READ: u16 = 125;
 pub const MAX_READ_BITS: u16 = 2_000;
 /// Most words of one 10H write.
 pub const MAX_WRITE: u16 = 123;
+/// Most coils of one 0FH write.
+pub const MAX_WRITE_BITS: u16 = 1_968;
+/// Most words that one 17H writes; it reads as many as 03H.
+pub const MAX_READ_WRITE: u16 = 121;
 /// Address and CRC.
 pub(crate) const AROUND_PDU: usize = 1 + CRC_LEN;
 /// The CRC.
@@ -31,8 +35,20 @@ pub mod function {
     pub const WRITE_SINGLE: u8 = 0x06;
     /// Diagnostics; sub-function 0000 is the echo.
     pub const DIAGNOSTICS: u8 = 0x08;
+    /// Write several coils.
+    pub const WRITE_COILS: u8 = 0x0F;
     /// Write several registers.
     pub const WRITE_MULTIPLE: u8 = 0x10;
+    /// Report what the unit is, in its own words.
+    pub const REPORT_SERVER_ID: u8 = 0x11;
+    /// Change bits of one register.
+    pub const MASK_WRITE: u8 = 0x16;
+    /// Write several registers, then read several.
+    pub const READ_WRITE: u8 = 0x17;
+    /// What another kind of interface carries; [`IDENTIFICATION`] is one.
+    pub const ENCAPSULATED: u8 = 0x2B;
+    /// Of [`ENCAPSULATED`]: who made the unit, and what it is.
+    pub const IDENTIFICATION: u8 = 0x0E;
     /// Set in the function code of an exception.
     pub const EXCEPTION_BIT: u8 = 0x80;
 }

@@ -1,13 +1,19 @@
 //! What a master asks: the PDUs of requests, built and parsed.
 //!
-//! Source: *Modbus Application Protocol* V1.1b3, §6.1 to §6.6, §6.8, §6.12.
+//! Source: *Modbus Application Protocol* V1.1b3, §6.1 to §6.6, §6.8, §6.11 to §6.13, §6.16, §6.17, §6.21.
 
 use core::fmt;
 
+use crate::functions::reads;
+use crate::identification::IdentificationLevel;
 use crate::pdu::function::{
-    DIAGNOSTICS, EXCEPTION_BIT, READ_COILS, READ_INPUT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE,
+    DIAGNOSTICS, ENCAPSULATED, EXCEPTION_BIT, IDENTIFICATION, MASK_WRITE, READ_COILS, READ_INPUT, READ_WRITE,
+    REPORT_SERVER_ID, WRITE_COIL, WRITE_COILS, WRITE_MULTIPLE, WRITE_SINGLE,
 };
-use crate::pdu::{AROUND_PDU, AnswerLength, MAX_PDU, MAX_READ, MAX_WRITE, coil_of, coil_word, put_words};
+use crate::pdu::{
+    AROUND_PDU, AnswerLength, MAX_PDU, MAX_READ, MAX_READ_WRITE, MAX_WRITE, MAX_WRITE_BITS, coil_of, coil_word,
+    put_words,
+};
 use crate::{Table, Words};
 
 /// A request. Made only by the checked constructors and by [`parse`](Self::parse), so that none is out of range.
@@ -53,6 +59,46 @@ pub enum Request<'a> {
         address: u16,
         /// 1..=123 words.
         words: Words<'a>,
+    },
+    /// 0FH: write several coils from `address` on.
+    #[non_exhaustive]
+    WriteCoils {
+        /// First coil.
+        address: u16,
+        /// 1..=1968 words of 0 or 1.
+        words: Words<'a>,
+    },
+    /// 11H: the unit tells what it is, and whether it runs, in bytes of its own.
+    ReportServerId,
+    /// 16H: the register gets its own bits where `and` has ones, and those of `or` elsewhere.
+    #[non_exhaustive]
+    MaskWrite {
+        /// Register.
+        address: u16,
+        /// Bits that stay.
+        and: u16,
+        /// Bits that are set where `and` has zeros.
+        or: u16,
+    },
+    /// 17H: write several words, then read several.
+    #[non_exhaustive]
+    ReadWrite {
+        /// First register that is read.
+        address: u16,
+        /// 1..=125 words are read.
+        count: u16,
+        /// First register that is written, before the others are read.
+        write_address: u16,
+        /// 1..=121 words.
+        words: Words<'a>,
+    },
+    /// 2BH/0EH: who made the unit, and what it is.
+    #[non_exhaustive]
+    ReadIdentification {
+        /// How much of it.
+        level: IdentificationLevel,
+        /// From which object on, or which one.
+        object: u8,
     },
     /// Any other PDU.
     #[non_exhaustive]
@@ -118,6 +164,51 @@ impl<'a> Request<'a> {
         }
     }
 
+    /// 0FH: `words` (1..=1968 of 0, off, or anything else, on) to the coils from `address` on.
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError`]: the count is out of range, or the last coil would lie beyond 0xFFFF.
+    pub const fn write_coils(address: u16, words: &'a [u16]) -> Result<Self, RequestError> {
+        match check_range(address, words.len(), MAX_WRITE_BITS) {
+            Ok(_) => Ok(Self::WriteCoils { address, words: Words::new(words) }),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// 11H: what the unit is, in bytes of its own.
+    pub const fn report_server_id() -> Self {
+        Self::ReportServerId
+    }
+
+    /// 16H: the register at `address` keeps its bits where `and` has ones, and gets those of `or` elsewhere.
+    pub const fn mask_write(address: u16, and: u16, or: u16) -> Self {
+        Self::MaskWrite { address, and, or }
+    }
+
+    /// 17H: `words` (1..=121) to `write_address` and on, then `count` words (1..=125) from `address`.
+    ///
+    /// # Errors
+    ///
+    /// [`RequestError`]: a count is out of range, or the last register would lie beyond 0xFFFF.
+    pub const fn read_write(
+        address: u16,
+        count: u16,
+        write_address: u16,
+        words: &'a [u16],
+    ) -> Result<Self, RequestError> {
+        match (check_range(address, count as usize, MAX_READ), check_range(write_address, words.len(), MAX_READ_WRITE))
+        {
+            (Ok(_), Ok(_)) => Ok(Self::ReadWrite { address, count, write_address, words: Words::new(words) }),
+            (Err(error), _) | (_, Err(error)) => Err(error),
+        }
+    }
+
+    /// 2BH/0EH: the identification of that `level` from `object` on; of [`One`](IdentificationLevel::One) that object alone.
+    pub const fn read_identification(level: IdentificationLevel, object: u8) -> Self {
+        Self::ReadIdentification { level, object }
+    }
+
     /// Any `pdu`: function code 1..=127 and 0..=252 bytes of data.
     ///
     /// # Errors
@@ -140,7 +231,8 @@ impl<'a> Request<'a> {
     /// The request that `pdu` is.
     ///
     /// A diagnostic other than the echo, and a function code without a name here, come back as
-    /// [`Custom`](Self::Custom).
+    /// [`Custom`](Self::Custom). So does a 0FH, 11H, 16H, 17H or 2BH that is not as the specification has it: few units know
+    /// those functions, and others may mean something of their own by them.
     ///
     /// # Errors
     ///
@@ -176,7 +268,42 @@ impl<'a> Request<'a> {
             [READ_COILS..=READ_INPUT | WRITE_COIL | WRITE_SINGLE | WRITE_MULTIPLE, ..] | [DIAGNOSTICS, 0, 0, ..] => {
                 Err(RequestError::PduLength { len: pdu.len() })
             }
-            _ => Self::custom(pdu, AnswerLength::BySilence),
+            _ => match Self::seldom(pdu) {
+                Some(request) => Ok(request),
+                None => Self::custom(pdu, AnswerLength::BySilence),
+            },
+        }
+    }
+
+    /// The request of a function that few units know.
+    #[cold]
+    fn seldom(pdu: &'a [u8]) -> Option<Self> {
+        match *pdu {
+            [WRITE_COILS, a1, a0, c1, c0, bytes, ref data @ ..] if usize::from(bytes) == data.len() => {
+                let (address, count) = (u16::from_be_bytes([a1, a0]), u16::from_be_bytes([c1, c0]));
+                let whole = Table::Coil.bytes(count.into()) == data.len();
+                let words = Words::from_bits(data, count);
+                check_range(address, count.into(), MAX_WRITE_BITS).ok().filter(|_| whole)?;
+                Some(Self::WriteCoils { address, words })
+            }
+            [REPORT_SERVER_ID] => Some(Self::ReportServerId),
+            [MASK_WRITE, a1, a0, n1, n0, o1, o0] => Some(Self::mask_write(
+                u16::from_be_bytes([a1, a0]),
+                u16::from_be_bytes([n1, n0]),
+                u16::from_be_bytes([o1, o0]),
+            )),
+            [READ_WRITE, a1, a0, c1, c0, w1, w0, n1, n0, bytes, ref data @ ..] if usize::from(bytes) == data.len() => {
+                let (address, count) = (u16::from_be_bytes([a1, a0]), u16::from_be_bytes([c1, c0]));
+                let (write_address, written) = (u16::from_be_bytes([w1, w0]), u16::from_be_bytes([n1, n0]));
+                let words = Words::from_wire(data).filter(|words| words.len() == usize::from(written))?;
+                check_range(address, count.into(), MAX_READ).ok()?;
+                check_range(write_address, words.len(), MAX_READ_WRITE).ok()?;
+                Some(Self::ReadWrite { address, count, write_address, words })
+            }
+            [ENCAPSULATED, IDENTIFICATION, level, object] => {
+                Some(Self::read_identification(IdentificationLevel::of_code(level)?, object))
+            }
+            _ => None,
         }
     }
 
@@ -188,6 +315,11 @@ impl<'a> Request<'a> {
             Self::WriteSingle { .. } => WRITE_SINGLE,
             Self::Echo { .. } => DIAGNOSTICS,
             Self::WriteMultiple { .. } => WRITE_MULTIPLE,
+            Self::WriteCoils { .. } => WRITE_COILS,
+            Self::ReportServerId => REPORT_SERVER_ID,
+            Self::MaskWrite { .. } => MASK_WRITE,
+            Self::ReadWrite { .. } => READ_WRITE,
+            Self::ReadIdentification { .. } => ENCAPSULATED,
             Self::Custom { pdu, .. } => pdu[0],
         }
     }
@@ -198,14 +330,14 @@ impl<'a> Request<'a> {
     /// 18H, 08H with a sub-function that returns a counter, or 2BH with 0EH.
     pub const fn is_write(&self) -> bool {
         match self {
-            Self::Read { .. } | Self::Echo { .. } => false,
-            Self::WriteCoil { .. } | Self::WriteSingle { .. } | Self::WriteMultiple { .. } => true,
-            Self::Custom { pdu, .. } => !matches!(
-                pdu,
-                [READ_COILS..=READ_INPUT | 0x07 | 0x0B | 0x0C | 0x11 | 0x14 | 0x18, ..]
-                    | [DIAGNOSTICS, 0, 0x00 | 0x02 | 0x0B..=0x12, ..]
-                    | [0x2B, 0x0E, ..]
-            ),
+            Self::Read { .. } | Self::Echo { .. } | Self::ReportServerId | Self::ReadIdentification { .. } => false,
+            Self::WriteCoil { .. }
+            | Self::WriteSingle { .. }
+            | Self::WriteMultiple { .. }
+            | Self::WriteCoils { .. }
+            | Self::MaskWrite { .. }
+            | Self::ReadWrite { .. } => true,
+            Self::Custom { pdu, .. } => !reads(pdu),
         }
     }
 
@@ -214,6 +346,11 @@ impl<'a> Request<'a> {
         let pdu = match self {
             Self::Read { .. } | Self::WriteCoil { .. } | Self::WriteSingle { .. } | Self::Echo { .. } => 5,
             Self::WriteMultiple { words, .. } => 6 + 2 * words.len(),
+            Self::WriteCoils { words, .. } => 6 + Table::Coil.bytes(words.len()),
+            Self::ReportServerId => 1,
+            Self::MaskWrite { .. } => 7,
+            Self::ReadWrite { words, .. } => 10 + 2 * words.len(),
+            Self::ReadIdentification { .. } => 4,
             Self::Custom { pdu, .. } => pdu.len(),
         };
         AROUND_PDU + pdu
@@ -239,6 +376,47 @@ impl<'a> Request<'a> {
             Self::Custom { pdu, .. } => {
                 target[..pdu.len()].copy_from_slice(pdu);
                 pdu.len()
+            }
+            _ => self.put_seldom(target),
+        }
+    }
+
+    /// Writes the PDU of a function that few units know into `target`, and returns its length.
+    #[cold]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "at most 1968 coils, or 121 words: checked by the constructors"
+    )]
+    fn put_seldom(&self, target: &mut [u8; MAX_PDU]) -> usize {
+        match *self {
+            Self::WriteCoils { address, words } => {
+                let bytes = Table::Coil.bytes(words.len());
+                put_words(target, WRITE_COILS, [address, words.len() as u16]);
+                target[5] = bytes as u8;
+                words.put_bits(&mut target[6..6 + bytes]);
+                6 + bytes
+            }
+            Self::MaskWrite { address, and, or } => {
+                put_words(target, MASK_WRITE, [address, and]);
+                target[5..7].copy_from_slice(&or.to_be_bytes());
+                7
+            }
+            Self::ReadWrite { address, count, write_address, words } => {
+                put_words(target, READ_WRITE, [address, count]);
+                target[5..7].copy_from_slice(&write_address.to_be_bytes());
+                target[7..9].copy_from_slice(&(words.len() as u16).to_be_bytes());
+                target[9] = 2 * words.len() as u8;
+                let end = 10 + 2 * words.len();
+                words.put(&mut target[10..end]);
+                end
+            }
+            Self::ReadIdentification { level, object } => {
+                target[..4].copy_from_slice(&[ENCAPSULATED, IDENTIFICATION, level.code(), object]);
+                4
+            }
+            _ => {
+                target[0] = self.function();
+                1
             }
         }
     }

@@ -6,7 +6,6 @@
 //! that it does not know.
 
 mod asked;
-mod lengths;
 mod role;
 mod roles;
 mod stories;
@@ -16,11 +15,10 @@ use core::ops::Range;
 use core::time::Duration;
 
 use crate::frame::{Frame, FrameError, MAX_ADU, MIN_ADU};
+use crate::functions::{FrameLength, frame_len};
 use crate::{Instant, SerialFormat, UnitAddress};
 
 pub(crate) use asked::{can_ask, may_be_answer};
-use lengths::Length;
-pub use lengths::frame_len;
 pub use role::Role;
 use stories::{Behind, Next};
 
@@ -101,16 +99,6 @@ impl<'a> Heard<'a> {
             _ => Some(Frame::found(self.bytes)),
         }
     }
-}
-
-/// How long the request is with which `here` begins, where its bytes tell.
-pub(crate) fn of_request(here: &[u8]) -> Option<usize> {
-    lengths::of_request(here).bytes()
-}
-
-/// How long the answer is with which `here` begins, where its bytes tell.
-pub(crate) fn of_answer(here: &[u8]) -> Option<usize> {
-    lengths::of_answer(here).bytes()
 }
 
 /// What stands at one place.
@@ -286,21 +274,21 @@ impl Sniffer {
         // What is asked for comes first: the bytes of a longer answer may look like a request.
         let expected = self.talk.expects(here);
         let (mut error, mut wait) = (None, false);
-        for length in [expected, lengths::of_request(here), lengths::of_answer(here)] {
+        for length in [expected, FrameLength::of_request(here), FrameLength::of_answer(here)] {
             match length {
-                Length::Is(len) => match here.get(..len).map(Frame::parse) {
+                FrameLength::Is(len) => match here.get(..len).map(Frame::parse) {
                     Some(Ok(_)) => return Look::Frame(len),
                     Some(Err(why)) => error = error.or(Some(why)),
                     None if !is_over && length == expected => return Look::Wait,
                     None => wait = true,
                 },
-                Length::Later => wait = true,
-                Length::Unknown if fresh => match self.by_search(start, is_over) {
+                FrameLength::Later => wait = true,
+                FrameLength::Unknown if fresh => match self.by_search(start, is_over) {
                     Look::Frame(len) => return Look::Frame(len),
                     Look::Wait => wait = true,
                     Look::Nothing(why) => error = error.or(why),
                 },
-                Length::Unknown | Length::Never => {}
+                FrameLength::Unknown | FrameLength::Never => {}
             }
         }
         if wait && !is_over { Look::Wait } else { Look::Nothing(error) }

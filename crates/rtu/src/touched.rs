@@ -1,12 +1,10 @@
 //! Which places a request reads or writes, by its bytes alone: also where its counts are wrong, which a unit may not look at.
 //!
-//! Source: *Modbus Application Protocol* V1.1b3, §6.1 to §6.6, §6.11, §6.12.
+//! Source: *Modbus Application Protocol* V1.1b3, §6.1 to §6.6, §6.11, §6.12, §6.17. Of 17H what it writes is told, and not what it
+//! reads; what 16H leaves of a register nobody knows who has not read it.
 
-use crate::pdu::function::{WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE};
+use crate::pdu::function::{READ_WRITE, WRITE_COIL, WRITE_COILS, WRITE_MULTIPLE, WRITE_SINGLE};
 use crate::table::Table;
-
-/// 0FH, coils as bits, of which the first is the lowest.
-const WRITE_COILS: u8 = 0x0F;
 
 /// What a request reads or writes.
 ///
@@ -50,6 +48,12 @@ impl<'a> Touched<'a> {
             (WRITE_SINGLE, []) => Some(one(Table::Holding, Written::Word(second))),
             (WRITE_COILS, _) => Some(many(Table::Coil, data_of(rest).map(Written::Coils))),
             (WRITE_MULTIPLE, _) => Some(many(Table::Holding, data_of(rest).map(Written::Words))),
+            (READ_WRITE, &[a1, a0, c1, c0, ref rest @ ..]) => Some(Self {
+                table: Table::Holding,
+                address: u16::from_be_bytes([a1, a0]),
+                count: u16::from_be_bytes([c1, c0]),
+                written: data_of(rest).map(Written::Words),
+            }),
             _ => Table::of_function(function).map(|table| many(table, None)),
         }
     }

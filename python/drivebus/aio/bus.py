@@ -25,6 +25,7 @@ from drivebus.identify.results import Found, Identification
 from drivebus.line.asking import Read, Stamped, Write, asking
 from drivebus.line.blocking import BlockingBus
 from drivebus.line.blocking_requests import Requests
+from drivebus.line.device import DeviceIdentification
 from drivebus.line.poll_samples import Names, Reads
 from drivebus.line.protocols import AwaitableBus
 from drivebus.line.scan_order import asked
@@ -201,6 +202,11 @@ class Bus(BusFace):
     async def echo(self, unit: int, word: int | None = None) -> float:
         """See `Requests.echo`."""
         return await self._asked().echo(unit, word)
+
+    @documented_by(Requests.device_identification)
+    async def device_identification(self, unit: int) -> DeviceIdentification:
+        """See `Requests.device_identification`."""
+        return await self._asked().device_identification(unit)
 
     @documented_by(Requests.transact)
     async def transact(

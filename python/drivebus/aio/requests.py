@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, overload
 
+from drivebus import _native
 from drivebus.aio.line import Line
+from drivebus.errors import Refused
 from drivebus.line.asking import Read, Stamped, Write
 from drivebus.line.blocking import BlockingBus
 from drivebus.line.blocking_requests import (
@@ -19,6 +21,7 @@ from drivebus.line.blocking_requests import (
     transact_of,
     write_of,
 )
+from drivebus.line.device import DeviceIdentification, device_of
 from drivebus.line.stats import Link
 from drivebus.line.units import Units
 
@@ -112,6 +115,17 @@ class AwaitedRequests:
     async def echo(self, unit: int, word: int | None = None) -> float:
         """See `Requests`."""
         return await self._line.echo(*echo_of(self._known, unit, word))
+
+    async def device_identification(self, unit: int) -> DeviceIdentification:
+        """See `Requests`."""
+        unit, question = self._known.addresses.unit(unit), _native.DeviceQuestion()
+        while (pdu := question.pdu()) is not None:
+            try:
+                question.heard(await self._line.transact(unit, pdu, retries=None))
+            except Refused as refusal:
+                if not question.refused(refusal.code):
+                    raise
+        return device_of(unit, question)
 
     async def transact(
         self,

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from drivebus import _native, checks, tables
-from drivebus.errors import BadArgument
+from drivebus.errors import BadArgument, Refused
+from drivebus.line.device import DeviceIdentification, device_of
 from drivebus.line.units import Units
 
 if TYPE_CHECKING:
@@ -196,6 +197,24 @@ class Requests:
     def echo(self, unit: int, word: int | None = None) -> float:
         """Asks *unit* to send *word* (0..0xFFFF, random if None) back: 08H/0000. Returns the round trip in seconds."""
         return self._native.echo(*echo_of(self._known, unit, word))
+
+    def device_identification(self, unit: int) -> DeviceIdentification:
+        """Who made *unit* and what it is, as it says itself (2BH/0EH). Nothing of it changes.
+
+        What does not fit into one answer is asked for by more requests, 32 at most.
+
+        Raises:
+            Refused: Most units do not know the function, and refuse it with 01H.
+            NoAnswer, BadAnswer, PortError: The unit did not tell.
+        """
+        unit, question = self._known.addresses.unit(unit), _native.DeviceQuestion()
+        while (pdu := question.pdu()) is not None:
+            try:
+                question.heard(self._native.transact(unit, pdu, retries=None))
+            except Refused as refusal:
+                if not question.refused(refusal.code):
+                    raise
+        return device_of(unit, question)
 
     def transact(
         self,

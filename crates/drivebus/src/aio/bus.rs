@@ -7,7 +7,7 @@ use std::time::Duration;
 use drivebus_drive::task::{Outcome, Read, Step, Task, Wish};
 use drivebus_drive::{Identification, Look, Looks};
 use drivebus_drives::Place;
-use drivebus_line::{CallOptions as LineOptions, Reply, Stats};
+use drivebus_line::{CallOptions as LineOptions, DeviceIdentification, DeviceQuestion, Reply, Stats};
 use drivebus_rtu::{Destination, Instant, Request, UnitAddress};
 
 use super::asked::Asked;
@@ -101,6 +101,23 @@ impl Bus {
             Ok(unit) => Asked::echo(&self.0.core, unit.into(), LineOptions::default(), time),
             Err(error) => Asked::refused(error),
         }
+    }
+
+    /// Who made `unit` and what it is: as [`Bus::device_identification`](crate::Bus::device_identification).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Bus::device_identification`](crate::Bus::device_identification).
+    pub async fn device_identification(&self, unit: u8) -> Result<DeviceIdentification, Error> {
+        let mut question = DeviceQuestion::new();
+        while let Some(request) = question.request() {
+            let checked = || Ok((checks::unit(unit)?.into(), request, LineOptions::default()));
+            match self.ask(checked(), |reply| reply.pdu).await {
+                Ok(pdu) => question.heard(&pdu),
+                Err(error) => replies::asks_less(&mut question, error)?,
+            }
+        }
+        Ok(question.told())
     }
 
     /// Sends any PDU: as [`Bus::transact`](crate::Bus::transact).

@@ -3,7 +3,7 @@
 
 use std::slice;
 
-use drivebus_rtu::{Frame, MAX_ADU, crc};
+use drivebus_rtu::{Frame, FrameLength, MAX_ADU, crc};
 
 use crate::gateway::asked::{Asked, NotModbus};
 
@@ -41,14 +41,14 @@ impl Looked {
 /// as they had come before.
 pub(super) fn first<'b>(bytes: &'b [u8], looked: &mut Looked) -> Result<Option<(Asked, &'b [u8])>, NotModbus> {
     let most = bytes.len().min(MAX_ADU);
-    let found = match length(bytes) {
-        Some(length) if !(SHORTEST..=MAX_ADU).contains(&length) => return Err(NotModbus::Crc),
-        Some(length) => match bytes.get(..length) {
+    let found = match FrameLength::of_request(bytes) {
+        FrameLength::Later => return Ok(None),
+        FrameLength::Is(length) => match bytes.get(..length) {
             None => return Ok(None),
             Some(frame) => Frame::parse(frame).map(|_| length).map_err(|_| NotModbus::Crc)?,
         },
         // A function whose length is not known ends where a CRC says so.
-        None => match looked.end(&bytes[..most]) {
+        FrameLength::Unknown | FrameLength::Never => match looked.end(&bytes[..most]) {
             Some(length) => length,
             None if bytes.len() < MAX_ADU => return Ok(None),
             None => return Err(NotModbus::Crc),
@@ -58,16 +58,4 @@ pub(super) fn first<'b>(bytes: &'b [u8], looked: &mut Looked) -> Result<Option<(
     let (frame, behind) = bytes.split_at(found);
     let asked = Asked { transaction: 0, unit: frame[0], pdu: frame[1..found - 2].to_vec() };
     Ok(Some((asked, behind)))
-}
-
-/// How long the frame is that `bytes` begin with, as far as its function tells by now: by the specification V1.1b3, §6.
-fn length(bytes: &[u8]) -> Option<usize> {
-    match *bytes {
-        [_, 0x01..=0x06 | 0x08, ..] => Some(8),
-        [_, 0x07 | 0x0B | 0x0C | 0x11, ..] => Some(4),
-        [_, 0x0F | 0x10, _, _, _, _, count, ..] => Some(9 + usize::from(count)),
-        [_, 0x16, ..] => Some(10),
-        [_, 0x17, _, _, _, _, _, _, _, _, count, ..] => Some(13 + usize::from(count)),
-        _ => None,
-    }
 }

@@ -56,6 +56,32 @@ pub enum AnswerError {
         /// What it says: FF00H and 0000H mean something.
         value: u16,
     },
+    /// It gives another level of the identification.
+    Level {
+        /// What was asked for.
+        asked: u8,
+        /// What came.
+        came: u8,
+    },
+    /// It gives another object of the identification, or one where it cannot stand.
+    Object {
+        /// What was asked for, or stands before it.
+        asked: u8,
+        /// What came.
+        came: u8,
+    },
+    /// It says of its identification what the specification does not have.
+    Conformity {
+        /// What it says: 01H to 03H and 81H to 83H mean something.
+        came: u8,
+    },
+    /// It says of the rest of its identification what cannot be.
+    MoreFollows {
+        /// Whether more follows: 00H and FFH mean something.
+        more: u8,
+        /// Where that begins.
+        next: u8,
+    },
     /// Its length does not fit its function.
     Length {
         /// Bytes of the PDU.
@@ -84,6 +110,12 @@ impl fmt::Display for AnswerError {
             Self::Repeat { asked, came } => write!(f, "{asked} was sent, the answer repeats {came}"),
             Self::Bytes { asked, came } => write!(f, "{asked} bytes of data answer that, {came} came"),
             Self::Coil { value } => write!(f, "a coil is FF00H or 0000H, {value:04X}H came"),
+            Self::Level { asked, came } => write!(f, "level {asked:02X}H was asked for, {came:02X}H came"),
+            Self::Object { asked, came } => write!(f, "object {came:02X}H came where {asked:02X}H was asked for"),
+            Self::Conformity { came } => write!(f, "{came:02X}H is no conformity of an identification"),
+            Self::MoreFollows { more, next } => {
+                write!(f, "an identification cannot go on with {more:02X}H and object {next:02X}H")
+            }
             Self::Length { len } => write!(f, "a PDU of {len} bytes does not fit its function"),
             Self::Refusal { code } => {
                 write!(f, "exception {:02X}H came, which may be meant for another request", code.0)

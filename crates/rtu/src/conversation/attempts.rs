@@ -52,7 +52,8 @@ impl Conversation<'_> {
 
     /// The first attempt.
     fn begin(&mut self) {
-        if !matches!(self.question.request, Request::Read { .. }) {
+        let request = &self.question.request;
+        if !matches!(request, Request::Read { .. } | Request::ReportServerId | Request::ReadIdentification { .. }) {
             self.write = Write::of(&self.question, self.retries);
             self.course.go_on_with(self.question.timeout, 0);
         }

@@ -4,6 +4,7 @@
 use super::Framer;
 use crate::crc::{crc16, update};
 use crate::frame::{Frame, FrameError, MAX_ADU, MIN_ADU};
+use crate::functions::FrameLength;
 use crate::pdu::function::{
     DIAGNOSTICS, EXCEPTION_BIT, READ_COILS, READ_DISCRETE, READ_HOLDING, READ_INPUT, WRITE_COIL, WRITE_MULTIPLE,
     WRITE_SINGLE,
@@ -112,7 +113,7 @@ impl Framer {
     /// Lengths that a frame beginning with `here` can have, shortest first. One that is longer than what is there
     /// means: wait.
     fn lengths(&self, here: &[u8], expected: bool, fresh: bool) -> [Option<usize>; 3] {
-        let [first, second] = if expected { Self::answer_lengths(here) } else { self.known_lengths(here) };
+        let [first, second] = if expected { self.answer_lengths(here) } else { self.known_lengths(here) };
         // The longest frame is whole only when nothing follows it.
         let more = Some(here.len() + 1).filter(|_| here.len() <= MAX_ADU);
         let asked = match *here {
@@ -128,15 +129,21 @@ impl Framer {
     }
 
     /// Length that the answer looked for has by its own account.
-    fn answer_lengths(here: &[u8]) -> [Option<usize>; 2] {
+    fn answer_lengths(&self, here: &[u8]) -> [Option<usize>; 2] {
         let len = match *here {
             [_, READ_COILS..=READ_INPUT, bytes, ..] => EXCEPTION_ADU + usize::from(bytes),
             [_] | [_, READ_COILS..=READ_INPUT] => here.len() + 1,
             [_, WRITE_COIL | WRITE_SINGLE | DIAGNOSTICS | WRITE_MULTIPLE, ..] => SHORT_ADU,
             [_, function, ..] if function & EXCEPTION_BIT != 0 => EXCEPTION_ADU,
-            _ => return [None, None],
+            _ => return [self.told_length(here), None],
         };
         [Some(len).filter(|&len| len <= MAX_ADU), None]
+    }
+
+    /// Length that an answer has by its own account of which nobody knows it beforehand.
+    #[cold]
+    fn told_length(&self, here: &[u8]) -> Option<usize> {
+        FrameLength::of_answer(here).bytes().filter(|_| self.expect.is_some_and(|awaited| awaited.tells))
     }
 
     /// Lengths that a frame of either direction can have whose function is known.

@@ -91,7 +91,9 @@ impl Master {
                             return Some(Event::Wrong { error: AnswerError::Refusal { code }, frame });
                         }
                         // Nothing tells whose words these are.
-                        Ok(Answer::Read { .. }) if self.others.ask(now, unit, expected).is_some() => {
+                        Ok(Answer::Read { .. } | Answer::ReadWrite { .. })
+                            if self.others.ask(now, unit, expected).is_some() =>
+                        {
                             self.give_account(false);
                             self.state = State::Idle;
                             self.hear(now, range.clone());

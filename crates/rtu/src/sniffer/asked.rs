@@ -2,10 +2,9 @@
 
 use crate::Instant;
 use crate::frame::{Adu, Frame};
+use crate::functions::FrameLength;
 use crate::pdu::function::EXCEPTION_BIT;
 use crate::request::Request;
-
-use super::lengths::{self, Length};
 
 /// What a unit has said to a request so far that was not its answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -73,13 +72,13 @@ impl Asked {
     }
 
     /// How long the answer is, if `here` begins as it.
-    pub(super) fn answer_len(&self, here: &[u8]) -> Length {
+    pub(super) fn answer_len(&self, here: &[u8]) -> FrameLength {
         let asked = self.bytes();
         match *here {
             [unit, function, ..] if unit == asked[0] && function == asked[1] && self.fits(here) => {
-                lengths::of_answer(here)
+                FrameLength::of_answer(here)
             }
-            _ => Length::Never,
+            _ => FrameLength::Never,
         }
     }
 
@@ -105,19 +104,19 @@ pub(super) fn is_pair(request: &[u8], answer: &[u8]) -> bool {
 
 /// Whether a master may have sent `frame`.
 pub(crate) fn can_ask(frame: &[u8]) -> bool {
-    match lengths::of_request(frame) {
-        Length::Is(len) => len == frame.len() && Request::parse(pdu(frame)).is_ok(),
-        Length::Unknown => true,
-        Length::Later | Length::Never => false,
+    match FrameLength::of_request(frame) {
+        FrameLength::Is(len) => len == frame.len() && Request::parse(pdu(frame)).is_ok(),
+        FrameLength::Unknown => true,
+        FrameLength::Later | FrameLength::Never => false,
     }
 }
 
 /// Whether a unit may have sent `frame`.
 pub(crate) fn may_be_answer(frame: &[u8]) -> bool {
-    match lengths::of_answer(frame) {
-        Length::Is(len) => len == frame.len(),
-        Length::Unknown => true,
-        Length::Later | Length::Never => false,
+    match FrameLength::of_answer(frame) {
+        FrameLength::Is(len) => len == frame.len(),
+        FrameLength::Unknown => true,
+        FrameLength::Later | FrameLength::Never => false,
     }
 }
 

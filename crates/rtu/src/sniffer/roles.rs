@@ -17,9 +17,9 @@ use core::time::Duration;
 use crate::Instant;
 
 use super::asked::{Asked, Spoken, can_ask, may_be_answer};
-use super::lengths::Length;
 use super::role::Role;
 use super::stories::{Behind, Held, Told};
+use crate::functions::FrameLength;
 
 /// How soon an answer comes, whatever is usual on this line.
 const SOON: Duration = Duration::from_millis(20);
@@ -59,8 +59,8 @@ impl Talk {
     }
 
     /// How long the answer to the open request is, if `here` begins as it.
-    pub(super) fn expects(&self, here: &[u8]) -> Length {
-        self.open().map_or(Length::Never, |asked| asked.answer_len(here))
+    pub(super) fn expects(&self, here: &[u8]) -> FrameLength {
+        self.open().map_or(FrameLength::Never, |asked| asked.answer_len(here))
     }
 
     /// Who said `frame`, which came from `began` to `ended`.

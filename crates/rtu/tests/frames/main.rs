@@ -10,5 +10,6 @@ mod framer;
 mod lumps;
 mod master;
 mod pdu;
+mod seldom;
 mod slave;
 mod sniffer;
