@@ -38,6 +38,7 @@ LINE_ROOMS = [
     "line",
     "error",
     "by_unit",
+    "device",
     "system",
     "turns",
     "trace",

@@ -53,7 +53,7 @@ class Details(TypedDict, total=False):
     ended: float | None
 
 
-_READS = (0x01, 0x02, 0x03, 0x04)
+_READS = (b"\x01", b"\x02", b"\x03", b"\x04", b"\x11", b"\x2b\x0e")
 
 
 class DrivebusError(Exception):
@@ -107,7 +107,9 @@ class DrivebusError(Exception):
         if not isinstance(self, LINE_ERRORS):
             return True
         # Of one request it is known whether it was sent, and a read asks for nothing.
-        return self.started is not None and self.request[1] not in _READS if self.request else self.unit is not None
+        if not self.request:
+            return self.unit is not None
+        return self.started is not None and not self.request.startswith(_READS, 1)
 
     @property
     def text(self) -> Text:

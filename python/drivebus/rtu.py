@@ -90,6 +90,8 @@ class Frame:
 SHORTEST, LONGEST = 4, 256
 """Bytes of a frame, its address and its CRC included."""
 
+_MASK_WRITE = 0x16
+
 _FIELDS = frozenset(field.name for field in fields(Frame))
 
 
@@ -117,7 +119,18 @@ def written(pdu: bytes) -> tuple[int, list[int]] | None:
     """The first address that the request *pdu* writes to, and the words; None if it writes none.
 
     Also of a 10H request whose counts are wrong, in which `decode` sees none: a drive may not look at them. Of a coil
-    (05H, 0FH) the address is its place, 0x1_0000 above it, and the words are 0 or 1.
+    (05H, 0FH) the address is its place, 0x1_0000 above it, and the words are 0 or 1. Of 17H it is what is written; what
+    16H leaves in a register depends on what is there: see `may_write`.
     """
     place, _, words = _native.touched(pdu) or (0, 0, None)
     return None if words is None else (place, words)
+
+
+def may_write(pdu: bytes) -> list[tuple[int, list[int]]]:
+    """What the request *pdu* may leave where it writes: as `written`; of 16H the least and the most."""
+    if len(pdu) != 7 or pdu[0] != _MASK_WRITE:
+        write = written(pdu)
+        return [] if write is None else [write]
+    address, kept, given = (int.from_bytes(pdu[at : at + 2], "big") for at in (1, 3, 5))
+    least = given & ~kept
+    return [(address, [word]) for word in sorted({least, least | kept})]

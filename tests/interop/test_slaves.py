@@ -57,6 +57,42 @@ def test_any_other_function(slave: tuple[str, drivebus.Bus]) -> None:
     assert bus.read(1, 0x12, 1) == [0x17]
 
 
+def test_who_made_it(slave: tuple[str, drivebus.Bus]) -> None:
+    whose, bus = slave
+    if whose == "libmodbus":  # it does not know the function
+        with pytest.raises(drivebus.Refused) as refused:
+            bus.device_identification(1)
+        assert (refused.value.code, refused.value.may_have_taken) == (1, False)
+        return
+    before = bus.stats().requests
+    device = bus.device_identification(1)
+    assert bus.stats().requests - before == 2
+    assert (device.vendor, device.product_code, device.revision) == ("pymodbus", "PM", "3.x")
+    assert (device.product_name, device.model_name, device.application_name) == ("a slave of others", None, None)
+    assert (device.objects[0x80], device.objects[0x90]) == (b"@" * 120, b"P" * 120)
+    assert (device.conformity, device.complete) == (0x83, True)
+    assert str(device) == "unit 1: pymodbus, a slave of others, PM, 3.x"
+    # One alone, and one that it has not.
+    assert bus.transact(1, b"\x2b\x0e\x04\x02") == b"\x2b\x0e\x04\x83\x00\x00\x01\x02\x033.x"
+    with pytest.raises(drivebus.Refused) as refused:
+        bus.transact(1, b"\x2b\x0e\x04\x05")
+    assert refused.value.code == 2
+
+
+def test_what_it_is_in_its_own_words(slave: tuple[str, drivebus.Bus]) -> None:
+    whose, bus = slave
+    said = b"pymodbus-PM-3.x\xff" if whose == "pymodbus" else b"LMB"
+    answer = bus.transact(1, b"\x11")
+    assert (answer[0], answer[1]) == (0x11, len(answer) - 2)
+    assert answer[2:].startswith(said) or said in answer[2:]
+
+
+def test_words_are_written_and_read_at_once(slave: tuple[str, drivebus.Bus]) -> None:
+    _, bus = slave
+    pdu = bytes.fromhex("17 0020 0003 0021 0001 02 1234")
+    assert bus.transact(1, pdu) == bytes.fromhex("17 06 0020 1234 0022")
+
+
 def test_loop_back(slave: tuple[str, drivebus.Bus]) -> None:
     whose, bus = slave
     if whose == "libmodbus":

@@ -228,7 +228,7 @@ class Requests:
 
         *reply_length* is the length of the answer's PDU in bytes; without it, the end is found by function or silence,
         and what the specification says of that function's answers is checked.
-        What 06H and 10H would write is refused as `write` refuses it, unless *force*.
+        What 06H, 0FH, 10H, 16H and 17H would write is refused as `write` refuses it, unless *force*.
         """
         return self._native.transact(*transact_of(self._known, unit, pdu, reply_length, force))
 

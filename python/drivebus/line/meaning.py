@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivebus import rtu, tables
+from drivebus import _native, rtu, tables
 from drivebus.errors import DrivebusError
 from drivebus.line import huanyang
 from drivebus.line.inside import wrong_inside
@@ -55,7 +55,57 @@ def _request(fields: rtu.Frame, profile: Profile | None) -> str:
             return f"write {_values(first, fields.words or [], profile, written=True)}"
         case "echo":
             return f"echo {fields.data:04X}H"
-    return f"function {fields.function:02X}H"
+    return _seldom_request(fields.pdu or b"", profile) or f"function {fields.function:02X}H"
+
+
+def _seldom_request(pdu: bytes, profile: Profile | None) -> str | None:
+    """What the request *pdu* asks for, of a function that few units know; None where it has not the form of one."""
+    place, _, words = _native.touched(pdu) or (0, 0, None)
+    match pdu[:1]:
+        case b"\x0f" if words:
+            return f"write {_values(place, words, profile, written=True)}"
+        case b"\x11" if len(pdu) == 1:
+            return "say what it is"
+        case b"\x16" if len(pdu) == 7:
+            return f"change bits of {_names(_word(pdu, 1), 1, profile, written=True)}: {_masks(pdu)}"
+        case b"\x17" if words:
+            read = _names(_word(pdu, 1), _word(pdu, 3), profile)
+            return f"write {_values(place, words, profile, written=True)}, then read {read}"
+        case b"\x2b" if pdu[1:2] == b"\x0e" and len(pdu) == 4:
+            return f"say who made it, from object {pdu[3]:02X}H" if pdu[3] else "say who made it"
+    return None
+
+
+def _seldom_answer(pdu: bytes, asked: bytes | None, profile: Profile | None) -> str | None:
+    """The same of an answer, to the frame *asked*."""
+    match pdu[:1]:
+        case b"\x0f" if len(pdu) == 5:
+            return f"took {_names(tables.place('coil', _word(pdu, 1)), _word(pdu, 3), profile, written=True)}"
+        case b"\x11" if len(pdu) > 1:
+            return f"says that it is {pdu[2:].hex(' ').upper()}"
+        case b"\x16" if len(pdu) == 7:
+            return f"changed bits of {_names(_word(pdu, 1), 1, profile, written=True)}: {_masks(pdu)}"
+        case b"\x17" if asked is not None and asked[1] == 0x17 and len(pdu) == 2 + 2 * _word(asked, 4):
+            words = [_word(pdu, at) for at in range(2, len(pdu), 2)]
+            return f"answers {_values(_word(asked, 2), words, profile)}"
+        case b"\x2b":
+            objects = _native.device_objects(pdu)
+            return objects and f"says that it is {', '.join(_object(*told) for told in objects)}"
+    return None
+
+
+def _object(number: int, value: bytes) -> str:
+    """An object of a unit's identification. Those of the maker's own need not be text."""
+    text = value.decode("ascii", "replace").strip("\0 ")
+    return f'"{text}"' if number < 0x80 and text.isprintable() else value.hex(" ").upper()
+
+
+def _masks(pdu: bytes) -> str:
+    return f"and {_word(pdu, 3):04X}H, or {_word(pdu, 5):04X}H"
+
+
+def _word(data: bytes, at: int) -> int:
+    return int.from_bytes(data[at : at + 2], "big")
 
 
 def _answer(fields: rtu.Frame, asked: bytes | None, profile: Profile | None) -> str:
@@ -78,7 +128,7 @@ def _answer(fields: rtu.Frame, asked: bytes | None, profile: Profile | None) -> 
             return f"refuses function {fields.function:02X}H: exception {code:02X}H{known}"
         case "read":
             return f"is asked by another master: read {_names(_place(fields), fields.count or 0, profile)}"
-    return f"answers function {fields.function:02X}H"
+    return _seldom_answer(fields.pdu or b"", asked, profile) or f"answers function {fields.function:02X}H"
 
 
 def _read_from(asked: bytes | None, answer: rtu.Frame) -> int | None:

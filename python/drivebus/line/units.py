@@ -119,11 +119,9 @@ class Units:
 
     def check_pdu(self, unit: int, pdu: bytes, force: bool = False) -> None:
         """As `check`, for what a request to write carries; any other is let pass."""
-        from drivebus.rtu import written
+        from drivebus.rtu import may_write
 
-        write = written(pdu)
-        if write is not None:
-            address, words = write
+        for address, words in may_write(pdu):
             self.check(unit, address, words, force)
 
 

@@ -53,8 +53,9 @@ class UnitFamilies:
             replace(self._session, unit=request.unit).will_write()
         if force:
             return
-        profile, write = self.known(request.unit), drivebus.rtu.written(request.pdu)
+        profile = self.known(request.unit)
         if profile is None:
             check_commands(request)
-        elif write is not None:
-            check_words([profile], request.unit, *write)
+            return
+        for address, words in drivebus.rtu.may_write(request.pdu):
+            check_words([profile], request.unit, address, words)

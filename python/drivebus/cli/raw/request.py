@@ -85,12 +85,11 @@ def check_commands(request: Request) -> None:
 
     What the unit is, nobody has said; what the code cannot mean is known all the same.
     """
-    write = drivebus.rtu.written(request.pdu)
-    if write is None:
+    written = drivebus.rtu.may_write(request.pdu)
+    if not written:
         return
-    first, words = write
     families = [drivebus.Profile.builtin(name) for name in drivebus.profiles()]
-    for address, word in enumerate(words, first):
+    for address, word in (place for first, words in written for place in enumerate(words, first)):
         there = [family for family in families if address in family.command_registers()]
         if there and not any(word in family.command_registers()[address] for family in there):
             raise drivebus.BadArgument(

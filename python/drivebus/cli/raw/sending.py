@@ -153,13 +153,12 @@ class Sender:
 
     def _may_move(self, request: Request) -> bool:
         """Whether *request* writes to what is a command register, of the unit's family or of any."""
-        write = drivebus.rtu.written(request.pdu)
-        if write is None:
+        places = [first + at for first, words in drivebus.rtu.may_write(request.pdu) for at in range(len(words))]
+        if not places:
             return False
         known = self._families.known(request.unit)
         families = [known] if known else [drivebus.Profile.builtin(name) for name in drivebus.profiles()]
-        first, words = write
-        return any(family.is_command(first + place) for family in families for place in range(len(words)))
+        return any(family.is_command(place) for family in families for place in places)
 
     def told(self, total: int) -> str:
         """How many of *total* requests were sent, and how many failed."""

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drivebus_line::{CallOptions, Failure};
-use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Request};
+use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, IdentificationLevel, Request};
 
 use crate::scripted::{FORMAT, Pieces, Rig, at_once, lumps, millis, right, unit};
 
@@ -29,6 +29,11 @@ fn requests() -> Vec<(&'static str, Request<'static>)> {
         ("06H", Request::write(0x2001, 1000)),
         ("10H", Request::write_many(0x2000, &[1, 1000]).unwrap()),
         ("08H", Request::echo(0xBEEF)),
+        ("0FH", Request::write_coils(0x13, &[1, 0, 1]).unwrap()),
+        ("11H", Request::report_server_id()),
+        ("16H", Request::mask_write(4, 0xF2, 0x25)),
+        ("17H", Request::read_write(3, 6, 0x0E, &[0xFF, 0xFF]).unwrap()),
+        ("2BH", Request::read_identification(IdentificationLevel::Extended, 0)),
         ("05H", Request::custom(&[0x05, 0, 1, 0xFF, 0], AnswerLength::BySilence).unwrap()),
         ("05H of known length", Request::custom(&[0x05, 0, 1, 0xFF, 0], AnswerLength::Bytes(5)).unwrap()),
     ]

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 
 mod broken;
+mod device;
 mod doubts;
 mod echoing;
 mod first_contact;

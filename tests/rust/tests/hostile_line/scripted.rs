@@ -6,7 +6,10 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use drivebus_line::{Bus, BusOptions, CallError, CallOptions, Done, Line, LineClock, PortError, PortErrorKind};
-use drivebus_rtu::{Adu, Answer, Destination, FIRST_CONTACT, Frame, Instant, Request, SerialFormat, UnitAddress};
+use drivebus_rtu::{
+    Adu, Answer, Destination, FIRST_CONTACT, Frame, IdentificationPage, Instant, MAX_PDU, Request, SerialFormat,
+    UnitAddress,
+};
 
 pub(crate) const FORMAT: SerialFormat = SerialFormat::DEFAULT;
 
@@ -23,17 +26,29 @@ pub(crate) fn unit(raw: u8) -> UnitAddress {
     UnitAddress::new(raw).unwrap()
 }
 
+/// Who made every unit.
+pub(crate) const OBJECTS: &[(u8, &[u8])] = &[(0, b"Example"), (1, b"EX-1"), (2, b"V2.11"), (0x80, &[b'x'; 240])];
+
 /// The right answer to `request`.
 pub(crate) fn right(request: &[u8]) -> Vec<u8> {
     let frame = Frame::parse(request).unwrap();
     let request = Request::parse(frame.pdu()).unwrap();
     let words: Vec<u16>;
+    let mut buffer = [0; MAX_PDU];
     let answer = match request {
         Request::Read { address, count, .. } => {
             words = (address..address + count).collect();
             Answer::read(&words).unwrap()
         }
         Request::Custom { pdu, .. } => Answer::custom(pdu).unwrap(),
+        Request::ReadWrite { address, count, .. } => {
+            words = (address..address + count).collect();
+            Answer::read_write(&words).unwrap()
+        }
+        Request::ReportServerId => Answer::server_id(b"unit\xFF").unwrap(),
+        Request::ReadIdentification { level, object, .. } => {
+            IdentificationPage::answer(OBJECTS, (level, object), &mut buffer)
+        }
         _ => Answer::confirming(&request).unwrap(),
     };
     Adu::answer(unit(frame.address()), &answer).as_bytes().to_vec()

@@ -1,0 +1,116 @@
+"""Who made a unit, by its own words, and what is said of functions that few units know.
+
+Frames: *Modbus Application Protocol* V1.1b3, §6.11, §6.13, §6.16, §6.17, §6.21.
+"""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+import drivebus
+from drivebus import _native, aio
+from drivebus.line.device import device_of
+from drivebus.line.meaning import meaning
+from drivebus.rtu import framed, may_write
+
+KBR = bytes.fromhex("2B 0E 01 01 00 00 03 00 08") + b"KBR GmbH\x01\x12multicomp F144-3  \x02\x09 2.00r016"
+"""KBR, multicomp F144-3, document 25359_EDEBDA0279-2320-1_EN, p. 63."""
+
+
+def test_a_drive_that_does_not_know_it_refuses() -> None:
+    with drivebus.Bus("sim://gd350?clock=virtual") as bus:
+        with pytest.raises(drivebus.Refused) as refused:
+            bus.device_identification(1)
+        assert (refused.value.code, refused.value.may_have_taken) == (1, False)
+        assert bus.stats().requests == 1
+
+
+def test_a_silent_unit_is_asked_as_often_as_a_read() -> None:
+    with drivebus.Bus("sim://gd350?clock=virtual", retries=2) as bus:
+        with pytest.raises(drivebus.NoAnswer) as silent:
+            bus.device_identification(9)
+        assert silent.value.may_have_taken is False
+        assert bus.stats().units[9].requests == 3
+
+
+def test_who_only_reads_may_ask() -> None:
+    with drivebus.Bus("sim://gd350?clock=virtual", read_only=True) as bus:
+        for pdu in ("2B 0E 01 00", "11"):
+            with pytest.raises(drivebus.Refused):
+                bus.transact(1, bytes.fromhex(pdu))
+        asked = bus.stats().requests
+        for pdu in ("0F 0013 000A 02 CD01", "16 0004 00F2 0025", "17 0003 0006 000E 0001 02 00FF"):
+            with pytest.raises(drivebus.NotAllowed, match="read-only"):
+                bus.transact(1, bytes.fromhex(pdu))
+        assert bus.stats().requests == asked
+
+
+def test_the_other_face_asks_the_same() -> None:
+    async def ask() -> None:
+        async with aio.Bus("sim://gd350?clock=virtual") as bus:
+            with pytest.raises(drivebus.Refused):
+                await bus.device_identification(1)
+
+    asyncio.run(ask())
+
+
+def test_what_a_unit_tells_is_one_value() -> None:
+    question = _native.DeviceQuestion()
+    assert question.pdu() == b"\x2b\x0e\x03\x00"
+    assert question.refused(3)
+    assert question.pdu() == b"\x2b\x0e\x01\x00"
+    question.heard(KBR)
+    assert question.pdu() is None
+    device = device_of(7, question)
+    assert str(device) == "unit 7: KBR GmbH, multicomp F144-3, 2.00r016"
+    assert (device.vendor, device.product_code, device.revision) == ("KBR GmbH", "multicomp F144-3", "2.00r016")
+    assert (device.vendor_url, device.conformity, device.complete) == (None, 1, True)
+    assert device == device_of(7, question)
+    assert hash(device) == hash(device_of(7, question))
+    assert device.objects[2] == b" 2.00r016"
+
+
+@pytest.mark.parametrize(
+    ("request_pdu", "asks", "answer_pdu", "answers"),
+    [
+        ("0F 0013 0003 01 05", "write coil 0013H = 1", "0F 0013 0003", "took 3 coils at 0013H"),
+        ("11", "say what it is", "11 03 4142FF", "says that it is 41 42 FF"),
+        (
+            "16 0004 00F2 0025",
+            "change bits of 0004H: and 00F2H, or 0025H",
+            "16 0004 00F2 0025",
+            "changed bits of 0004H: and 00F2H, or 0025H",
+        ),
+        ("17 0003 0002 000E 0001 02 00FF", "write 000EH = 255, then read", "17 04 0005 0006", "0003H = 5, 0004H = 6"),
+        ("2B 0E 01 00", "say who made it", KBR.hex(), 'says that it is "KBR GmbH", "multicomp F144-3", "2.00r016"'),
+        ("2B 0E 03 80", "say who made it, from object 80H", "AB 01", "refuses function 2BH: exception 01H"),
+        ("2B 0E 01", "function 2BH", "2B 0D 00", "answers function 2BH"),
+    ],
+)
+def test_what_is_asked_and_answered_has_words(request_pdu: str, asks: str, answer_pdu: str, answers: str) -> None:
+    asked, came = (framed(b"\x05" + bytes.fromhex(pdu)) for pdu in (request_pdu, answer_pdu))
+    assert asks in meaning(asked, True)
+    assert answers in meaning(came, False, asked)
+
+
+def test_what_a_mask_may_leave_is_held_against_commands() -> None:
+    assert may_write(bytes.fromhex("16 0004 00F2 0025")) == [(4, [0x0005]), (4, [0x00F7])]
+    assert may_write(bytes.fromhex("16 0004 0000 0025")) == [(4, [0x0025])]
+    assert may_write(bytes.fromhex("17 0003 0001 000E 0001 02 00FF")) == [(14, [255])]
+    assert may_write(bytes.fromhex("03 0003 0001")) == []
+
+
+@pytest.mark.parametrize("pdu", ["16 2000 FFF0 0001", "17 2000 0001 2000 0001 02 0063"])
+def test_no_family_is_commanded_what_it_does_not_define(pdu: str) -> None:
+    with drivebus.Bus("sim://gd350?clock=virtual") as bus:
+        bus.drive(1)
+        before = bus.stats().requests
+        with pytest.raises(drivebus.NotAllowed, match="not a command"):
+            bus.transact(1, bytes.fromhex(pdu))
+        assert bus.stats().requests == before
+        # Whoever means it may send it, once; this drive knows neither function.
+        with pytest.raises(drivebus.Refused):
+            bus.transact(1, bytes.fromhex(pdu), force=True)
+        assert bus.stats().requests == before + 1
