@@ -27,12 +27,10 @@ def test_a_drive_that_does_not_know_it_refuses() -> None:
         assert bus.stats().requests == 1
 
 
-def test_a_silent_unit_is_asked_as_often_as_a_read() -> None:
-    with drivebus.Bus("sim://gd350?clock=virtual", retries=2) as bus:
-        with pytest.raises(drivebus.NoAnswer) as silent:
-            bus.device_identification(9)
-        assert silent.value.may_have_taken is False
-        assert bus.stats().units[9].requests == 3
+def test_a_silent_unit_has_done_nothing() -> None:
+    with drivebus.Bus("sim://gd350?clock=virtual", retries=2) as bus, pytest.raises(drivebus.NoAnswer) as silent:
+        bus.device_identification(9)
+    assert silent.value.may_have_taken is False
 
 
 def test_who_only_reads_may_ask() -> None:

@@ -31,7 +31,7 @@ fn device(rig: &Rig) -> Result<DeviceIdentification, Box<CallError>> {
     let mut question = DeviceQuestion::new();
     while let Some(request) = question.request() {
         let take = &mut |answer: Answer<'_>| question.answered(&answer);
-        rig.call(unit(1).into(), &request, CallOptions::new().retries(2), &mut || false, take)?;
+        rig.call(unit(1).into(), &request, CallOptions::new().timeout(millis(2_000)), &mut || false, take)?;
     }
     Ok(question.told())
 }
@@ -100,20 +100,24 @@ fn a_late_answer_is_not_that_to_the_next_question() {
     }
 }
 
+/// The unit misses the first question, and sends every word back.
 #[test]
-fn a_silent_unit_is_asked_as_often_as_a_read_and_a_write_once() {
-    let silent = |_: usize, _: &[u8]| -> Pieces { Vec::new() };
+fn what_only_reads_is_asked_again_and_a_write_is_not() {
     let again = CallOptions::new().retries(2);
     for (request, times) in [
-        (BASIC, 3),
-        (Request::report_server_id(), 3),
+        (BASIC, 2),
+        (Request::report_server_id(), 2),
         (Request::mask_write(4, 0, 1), 1),
         (Request::write_coils(4, &[1]).unwrap(), 1),
         (Request::read_write(4, 1, 4, &[1]).unwrap(), 1),
     ] {
-        let rig = Rig::new(silent);
-        let error = rig.call(unit(1).into(), &request, again, &mut || false, &mut |_| ()).unwrap_err();
-        assert_eq!(rig.sent(&request), times, "{request:?}");
-        assert_eq!(error.may_have_acted(), request.is_write(), "{request:?}");
+        let (mut is_first, function) = (true, request.function());
+        let rig = Rig::new(move |_, sent| {
+            let misses = sent[1] == function && std::mem::take(&mut is_first);
+            if misses { Pieces::new() } else { after(millis(10), &right(sent)) }
+        });
+        let came = rig.call(unit(1).into(), &request, again, &mut || false, &mut |_| ());
+        assert_eq!((rig.sent(&request), came.is_ok()), (times, times > 1), "{request:?}: {came:?}");
+        assert!(came.is_ok() || came.is_err_and(|error| error.may_have_acted()));
     }
 }
