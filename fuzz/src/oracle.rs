@@ -80,7 +80,7 @@ pub(crate) enum Verdict {
 /// What is known of the length of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Length {
-    /// The function says it: 01H to 06H, 08H or 10H.
+    /// The function says it.
     Named,
     /// The PDU is the caller's own, and the caller said how many bytes its answer has.
     Given(u8),
@@ -112,12 +112,51 @@ impl Asked {
                 let bytes = if *read < 3 { count.div_ceil(8) } else { 2 * count };
                 answer.len() == 2 + bytes && usize::from(answer[1]) == bytes
             }
-            (Some(16), Length::Named) => answer == &self.pdu[..5],
+            (Some(15 | 16), Length::Named) => answer == &self.pdu[..5],
+            (Some(0x11), Length::Named) => answer.len() > 2 && usize::from(answer[1]) == answer.len() - 2,
+            (Some(0x17), Length::Named) => {
+                let bytes = 2 * word(&self.pdu, 3);
+                answer.len() == 2 + bytes && usize::from(answer[1]) == bytes
+            }
+            (Some(0x2B), Length::Named) => identifies(&self.pdu, answer),
             (Some(_), Length::Named) => answer == self.pdu,
             (None, _) => false,
         };
         if right { Verdict::Right } else { Verdict::Wrong }
     }
+}
+
+/// Whether `answer` brings objects of an identification that `asked` may ask for (§6.21).
+fn identifies(asked: &[u8], answer: &[u8]) -> bool {
+    let &[_, 0x0E, level, conformity, more, next, count, ref objects @ ..] = answer else { return false };
+    let (mut numbers, mut rest) = (Vec::new(), objects);
+    while let [number, len, behind @ ..] = rest {
+        if behind.len() < usize::from(*len) {
+            return false;
+        }
+        numbers.push(*number);
+        rest = &behind[usize::from(*len)..];
+    }
+    let most = [2, 0x7F, 0xFF, 0xFF][usize::from(asked[2]) - 1];
+    let rising = numbers.windows(2).all(|pair| pair[0] < pair[1]);
+    let goes_on = match (more, numbers.last()) {
+        (0, _) => true,
+        (0xFF, Some(&last)) => next > last && asked[2] < 4,
+        _ => false,
+    };
+    let begins = match (asked[2], numbers.first()) {
+        (4, first) => numbers.len() == 1 && first == Some(&asked[3]),
+        (_, None) => true,
+        (_, Some(&first)) => asked[3] == 0 || first == 0 || first == asked[3],
+    };
+    level == asked[2]
+        && [1, 2, 3, 0x81, 0x82, 0x83].contains(&conformity)
+        && rest.is_empty()
+        && numbers.len() == usize::from(count)
+        && numbers.iter().all(|&number| number <= most)
+        && rising
+        && goes_on
+        && begins
 }
 
 /// The frames in `bytes`, which begin and end with silence; `Err` stands for a byte that belongs to none.

@@ -2,8 +2,8 @@
 //! and what it answers is a valid answer to what it was asked.
 
 use drivebus_rtu::{
-    Adu, Answer, DataBits, Destination, ExceptionCode, Instant, Parity, Request, SerialFormat, Silence, Slave,
-    SlaveEvent, StopBits, UnitAddress,
+    Adu, Answer, DataBits, Destination, ExceptionCode, IdentificationPage, Instant, MAX_PDU, Parity, Request,
+    SerialFormat, Silence, Slave, SlaveEvent, StopBits, UnitAddress,
 };
 
 use crate::listener::{HELD, bursts};
@@ -100,12 +100,22 @@ fn expected(unit: UnitAddress, found: Result<&[u8], u8>) -> Heard {
 /// A unit that answers everything: as a device made of these parts would.
 fn check_answer(unit: UnitAddress, request: &Request<'_>, asked: &[u8]) {
     let words: Vec<u16>;
+    let mut buffer = [0; MAX_PDU];
     let answer = match *request {
         Request::Read { table, address, count, .. } => {
             // Whole bytes of bits: of the others an answer by itself does not tell.
             let whole = if table.is_bits() { count.next_multiple_of(8) } else { count };
             words = (0..whole).map(|n| if table.is_bits() { n & 1 } else { address.wrapping_add(n) }).collect();
             Answer::read_of(table, &words).ok()
+        }
+        Request::ReadWrite { address, count, .. } => {
+            words = (0..count).map(|n| address.wrapping_add(n)).collect();
+            Answer::read_write(&words).ok()
+        }
+        Request::ReportServerId => Answer::server_id(&[1, 0xFF]).ok(),
+        Request::ReadIdentification { level, object, .. } => {
+            let objects: Vec<(u8, &[u8])> = (0..=object).map(|number| (number, &b"object"[..])).collect();
+            Some(IdentificationPage::answer(&objects, (level, object), &mut buffer))
         }
         Request::Custom { pdu, .. } => Answer::custom(pdu).ok(),
         _ => Answer::confirming(request),

@@ -35,6 +35,12 @@ fn four(function: u8, first: u16, second: u16) -> Vec<u8> {
     [&[function][..], &first.to_be_bytes(), &second.to_be_bytes()].concat()
 }
 
+/// Bits, eight to a byte, the first the lowest.
+fn bytes_of(bits: impl Iterator<Item = u16>) -> Vec<u8> {
+    let bits: Vec<u8> = bits.map(|word| u8::from(word != 0)).collect();
+    bits.chunks(8).map(|byte| byte.iter().rev().fold(0, |all, bit| all << 1 | bit)).collect()
+}
+
 /// The PDU of a request, put together here.
 pub(crate) fn pdu_of(request: &Request<'_>) -> Vec<u8> {
     match *request {
@@ -49,6 +55,24 @@ pub(crate) fn pdu_of(request: &Request<'_>) -> Vec<u8> {
             pdu.extend(words.iter().flat_map(u16::to_be_bytes));
             pdu
         }
+        Request::WriteCoils { address, words, .. } => {
+            let bytes = bytes_of(words.iter());
+            let mut pdu = four(15, address, u16::try_from(words.len()).unwrap_or(0));
+            pdu.push(u8::try_from(bytes.len()).unwrap_or(0));
+            pdu.extend(bytes);
+            pdu
+        }
+        Request::ReportServerId => vec![0x11],
+        Request::MaskWrite { address, and, or, .. } => [&four(0x16, address, and)[..], &or.to_be_bytes()].concat(),
+        Request::ReadWrite { address, count, write_address, words, .. } => {
+            let written = u8::try_from(words.len()).unwrap_or(0);
+            let mut pdu = four(0x17, address, count);
+            pdu.extend(four(0, write_address, written.into()).into_iter().skip(1));
+            pdu.push(2 * written);
+            pdu.extend(words.iter().flat_map(u16::to_be_bytes));
+            pdu
+        }
+        Request::ReadIdentification { level, object, .. } => vec![0x2B, 0x0E, level.code(), object],
         Request::Custom { pdu, .. } => pdu.to_vec(),
         new => unreachable!("{new:?} is not judged here"),
     }
@@ -58,9 +82,7 @@ pub(crate) fn pdu_of(request: &Request<'_>) -> Vec<u8> {
 pub(crate) fn pdu_told(answer: &Answer<'_>) -> Vec<u8> {
     match *answer {
         Answer::Read { table: table @ (Table::Coil | Table::Discrete), words, .. } => {
-            let bits: Vec<u8> = words.iter().map(|word| u8::from(word != 0)).collect();
-            let bytes: Vec<u8> =
-                bits.chunks(8).map(|byte| byte.iter().rev().fold(0, |all, bit| all << 1 | bit)).collect();
+            let bytes = bytes_of(words.iter());
             [&[table.function(), u8::try_from(bytes.len()).unwrap_or(0)][..], &bytes].concat()
         }
         Answer::WriteCoil { address, on, .. } => four(5, address, if on { 0xFF00 } else { 0 }),
@@ -72,6 +94,14 @@ pub(crate) fn pdu_told(answer: &Answer<'_>) -> Vec<u8> {
         Answer::Echo { data, .. } => four(8, 0, data),
         Answer::WriteMultiple { address, count, .. } => four(16, address, count),
         Answer::Exception { function, code, .. } => vec![function | 0x80, code.0],
+        Answer::WriteCoils { address, count, .. } => four(15, address, count),
+        Answer::ServerId { data, .. } => [&[0x11, u8::try_from(data.len()).unwrap_or(0)][..], data].concat(),
+        Answer::MaskWrite { address, and, or, .. } => [&four(0x16, address, and)[..], &or.to_be_bytes()].concat(),
+        Answer::ReadWrite { words, .. } => {
+            let count = u8::try_from(2 * words.len()).unwrap_or(0);
+            [0x17, count].into_iter().chain(words.iter().flat_map(u16::to_be_bytes)).collect()
+        }
+        Answer::Identification { page, .. } => page.pdu().to_vec(),
         Answer::Custom { pdu, .. } => pdu.to_vec(),
         new => unreachable!("{new:?} is not judged here"),
     }

@@ -6,14 +6,19 @@ Frames: *Modbus Application Protocol* V1.1b3, §6.11, §6.13, §6.16, §6.17, §
 from __future__ import annotations
 
 import asyncio
+import json
 
 import pytest
+from click.testing import CliRunner
 
 import drivebus
 from drivebus import _native, aio
+from drivebus.cli import cli
 from drivebus.line.device import device_of
 from drivebus.line.meaning import meaning
 from drivebus.rtu import framed, may_write
+
+from .odd_slave import good, on_a_terminal
 
 KBR = bytes.fromhex("2B 0E 01 01 00 00 03 00 08") + b"KBR GmbH\x01\x12multicomp F144-3  \x02\x09 2.00r016"
 """KBR, multicomp F144-3, document 25359_EDEBDA0279-2320-1_EN, p. 63."""
@@ -52,6 +57,65 @@ def test_the_other_face_asks_the_same() -> None:
                 await bus.device_identification(1)
 
     asyncio.run(ask())
+
+
+PAGES = {
+    b"\x2b\x0e\x03\x00": b"\x2b\x0e\x03\x83\xff\x02\x02\x00\x07Example\x01\x04EX-1",
+    b"\x2b\x0e\x03\x02": b"\x2b\x0e\x03\x83\x00\x00\x03\x02\x02V2\x04\x03fan\x80\x02\x00\xff",
+}
+"""What a unit of names of our own answers, in two parts."""
+
+
+def telling(asked: list[bytes], pages: dict[bytes, bytes] = PAGES):  # type: ignore[no-untyped-def]  # a plan
+    """A unit that tells *pages*, refuses other identifications, and has no code that a drive has."""
+
+    def plan(request: bytes) -> bytes:
+        asked.append(request[1:])
+        if request[1] != 0x2B:
+            return good(request) if request[1] == 8 else framed(bytes([request[0], request[1] | 0x80, 2]))
+        return framed(request[:1] + pages.get(request[1:], b"\xab\x03"))
+
+    return plan
+
+
+def test_what_follows_is_asked_for() -> None:
+    asked: list[bytes] = []
+    with on_a_terminal(telling(asked)) as port:
+        with drivebus.Bus(port, share="never") as bus:
+            device = bus.device_identification(5)
+        identifications = [pdu for pdu in asked if pdu[0] == 0x2B]
+        assert identifications == list(PAGES)
+        assert (device.vendor, device.product_code, device.revision) == ("Example", "EX-1", "V2")
+        assert (device.product_name, device.objects[0x80], device.complete) == ("fan", b"\x00\xff", True)
+        assert str(device) == "unit 5: Example, fan, EX-1, V2"
+
+        async def ask() -> drivebus.DeviceIdentification:
+            async with aio.Bus(port, share="never") as bus:
+                return await bus.device_identification(5)
+
+        assert asyncio.run(ask()) == device
+
+
+def test_who_refuses_all_is_asked_for_the_least() -> None:
+    asked: list[bytes] = []
+    with on_a_terminal(telling(asked, {b"\x2b\x0e\x01\x00": KBR})) as port, drivebus.Bus(port, share="never") as bus:
+        assert bus.device_identification(5).vendor == "KBR GmbH"
+    assert [pdu for pdu in asked if pdu[0] == 0x2B] == [b"\x2b\x0e\x03\x00", b"\x2b\x0e\x01\x00"]
+
+
+def test_info_asks_a_unit_that_nobody_knows_who_made_it() -> None:
+    asked: list[bytes] = []
+    with on_a_terminal(telling(asked)) as port:
+        told = CliRunner().invoke(cli, ["--port", port, "--json", "info"], prog_name="drivebus")
+    facts = json.loads(told.stdout.splitlines()[0])
+    assert (facts["vendor"], facts["product"]) == ("Example", "fan, EX-1, V2")
+    assert told.exit_code != 0, "no family"
+    assert [pdu for pdu in asked if pdu[0] == 0x2B] == list(PAGES)
+
+
+def test_info_asks_no_drive_that_is_known() -> None:
+    told = CliRunner().invoke(cli, ["--port", "sim://gd350?clock=virtual", "--json", "info"], prog_name="drivebus")
+    assert (told.exit_code, "vendor" in told.stdout) == (0, False)
 
 
 def test_what_a_unit_tells_is_one_value() -> None:

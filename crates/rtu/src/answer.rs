@@ -2,11 +2,11 @@
 
 mod error;
 mod head;
+mod seldom;
 
 use crate::identification::IdentificationPage;
 use crate::pdu::function::{
-    DIAGNOSTICS, ENCAPSULATED, EXCEPTION_BIT, MASK_WRITE, READ_COILS, READ_HOLDING, READ_INPUT, READ_WRITE,
-    REPORT_SERVER_ID, WRITE_COIL, WRITE_COILS, WRITE_MULTIPLE, WRITE_SINGLE,
+    DIAGNOSTICS, EXCEPTION_BIT, READ_COILS, READ_HOLDING, READ_INPUT, WRITE_COIL, WRITE_MULTIPLE, WRITE_SINGLE,
 };
 use crate::pdu::{ExceptionCode, MAX_PDU, MAX_READ, MAX_READ_BITS, coil_of, coil_word, put_words};
 use crate::request::{Request, RequestError};
@@ -250,28 +250,6 @@ impl<'a> Answer<'a> {
         }
     }
 
-    /// The answer of a function that few units know, if it is as the specification has it.
-    #[cold]
-    fn seldom(pdu: &'a [u8]) -> Option<Self> {
-        match *pdu {
-            [WRITE_COILS, a1, a0, c1, c0] => {
-                Some(Self::WriteCoils { address: u16::from_be_bytes([a1, a0]), count: u16::from_be_bytes([c1, c0]) })
-            }
-            [REPORT_SERVER_ID, bytes, ref data @ ..] if usize::from(bytes) == data.len() => Self::server_id(data).ok(),
-            [MASK_WRITE, a1, a0, n1, n0, o1, o0] => Some(Self::MaskWrite {
-                address: u16::from_be_bytes([a1, a0]),
-                and: u16::from_be_bytes([n1, n0]),
-                or: u16::from_be_bytes([o1, o0]),
-            }),
-            [READ_WRITE, bytes, ref data @ ..] if usize::from(bytes) == data.len() => {
-                let words = Words::from_wire(data)?;
-                (1..=MAX_READ.into()).contains(&words.len()).then_some(Self::ReadWrite { words })
-            }
-            [ENCAPSULATED, ..] => IdentificationPage::parse(pdu).ok().map(|page| Self::Identification { page }),
-            _ => None,
-        }
-    }
-
     /// Writes the PDU into `target` and returns its length.
     pub(crate) fn put(&self, target: &mut [u8; MAX_PDU]) -> usize {
         match *self {
@@ -304,37 +282,6 @@ impl<'a> Answer<'a> {
                 pdu.len()
             }
             _ => self.put_seldom(target),
-        }
-    }
-
-    /// Writes the PDU of a function that few units know into `target`, and returns its length.
-    #[cold]
-    #[expect(clippy::cast_possible_truncation, reason = "at most 251 bytes: checked by the constructors")]
-    fn put_seldom(&self, target: &mut [u8; MAX_PDU]) -> usize {
-        match *self {
-            Self::WriteCoils { address, count } => put_words(target, WRITE_COILS, [address, count]),
-            Self::MaskWrite { address, and, or } => {
-                put_words(target, MASK_WRITE, [address, and]);
-                target[5..7].copy_from_slice(&or.to_be_bytes());
-                7
-            }
-            Self::ReadWrite { words } => {
-                let bytes = 2 * words.len();
-                target[..2].copy_from_slice(&[READ_WRITE, bytes as u8]);
-                words.put(&mut target[2..2 + bytes]);
-                2 + bytes
-            }
-            Self::ServerId { data } => {
-                target[..2].copy_from_slice(&[REPORT_SERVER_ID, data.len() as u8]);
-                target[2..2 + data.len()].copy_from_slice(data);
-                2 + data.len()
-            }
-            Self::Identification { page } => {
-                let pdu = page.pdu();
-                target[..pdu.len()].copy_from_slice(pdu);
-                pdu.len()
-            }
-            _ => 0,
         }
     }
 }

@@ -99,9 +99,8 @@ impl Expected {
             | Kind::WriteCoils { .. } => Some(5),
             Kind::MaskWrite { .. } => Some(7),
             Kind::ReadWrite { count } => Some(2 + 2 * count as usize),
-            Kind::ServerId | Kind::Identification { .. } => None,
             Kind::Custom { answer: AnswerLength::Bytes(pdu), .. } => Some(pdu as usize),
-            Kind::Custom { answer: AnswerLength::BySilence, .. } => None,
+            Kind::ServerId | Kind::Identification { .. } | Kind::Custom { answer: AnswerLength::BySilence, .. } => None,
         }
     }
 
@@ -301,7 +300,7 @@ impl Expected {
 
     /// The same, of a function that few units know. `answer` is what `pdu` is by itself.
     #[cold]
-    fn judge_seldom<'a>(&self, pdu: &'a [u8], answer: Answer<'a>) -> Result<Answer<'a>, AnswerError> {
+    fn judge_seldom<'a>(self, pdu: &'a [u8], answer: Answer<'a>) -> Result<Answer<'a>, AnswerError> {
         match (self.0, answer) {
             (Kind::WriteCoils { address, count }, Answer::WriteCoils { address: at, count: took }) => {
                 repeats([address, count], [at, took], answer)

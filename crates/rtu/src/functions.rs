@@ -30,6 +30,7 @@ use crate::pdu::function::{
 
 /// How long the frame is that begins so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FrameLength {
     /// So many bytes, address and CRC included.
     Is(usize),

@@ -27,6 +27,7 @@ const INDIVIDUAL: u8 = 0x80;
 /// How much of the identification is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum IdentificationLevel {
     /// Vendor, product code and revision: the objects 00H to 02H.
     Basic = 1,
@@ -164,7 +165,8 @@ impl<'a> IdentificationPage<'a> {
     }
 
     /// What a unit that has `objects`, in the order of their numbers, answers to the question for `level` from `object` on: as
-    /// many of them as fit into `buffer`, or the exception 02H where one that it has not is asked for alone.
+    /// many of them as fit into `buffer`, or the exception 02H where one that it has not is asked for alone. None may have more
+    /// than 244 bytes.
     pub fn answer<'b>(
         objects: &[(u8, &[u8])],
         (level, object): (IdentificationLevel, u8),
@@ -175,8 +177,8 @@ impl<'a> IdentificationPage<'a> {
         if level == IdentificationLevel::One && !has(object) {
             return refused;
         }
-        let first = if has(object) { object } else { 0 };
         let last = if level == IdentificationLevel::One { object } else { level.last() };
+        let first = if has(object) && object <= last { object } else { 0 };
         let conformity = match objects.last() {
             Some((0x80.., _)) => IdentificationLevel::Extended,
             Some((0x03.., _)) => IdentificationLevel::Regular,

@@ -5,7 +5,8 @@ use crate::pdu::AnswerLength;
 use crate::request::{Request, RequestError};
 
 impl<'a> Request<'a> {
-    /// The request that `pdu` is: 03H, 06H, 08H/0000 and 10H are checked as such, anything else is carried as it is.
+    /// The request that `pdu` is: 03H, 06H, 08H/0000 and 10H are checked as such, anything else is carried as it is. Of 0FH, 11H,
+    /// 16H, 17H and 2BH/0EH what has the form of the specification is known by its name.
     ///
     /// So are 01H, 02H, 04H and 05H: there are drives that mean something of their own by them, the Huanyang HY a write
     /// by 02H. Who means the tables of the specification asks [`read_of`](Self::read_of) and

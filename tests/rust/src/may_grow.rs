@@ -29,6 +29,11 @@ matched!(
     "WriteSingle { .. }",
     "Echo { .. }",
     "WriteMultiple { .. }",
+    "WriteCoils { .. }",
+    "ReportServerId",
+    "MaskWrite { .. }",
+    "ReadWrite { .. }",
+    "ReadIdentification { .. }",
     "Custom { .. }"
 );
 matched!(
@@ -39,6 +44,11 @@ matched!(
     "WriteSingle { .. }",
     "Echo { .. }",
     "WriteMultiple { .. }",
+    "WriteCoils { .. }",
+    "ServerId { .. }",
+    "MaskWrite { .. }",
+    "ReadWrite { .. }",
+    "Identification { .. }",
     "Exception { .. }",
     "Custom { .. }"
 );

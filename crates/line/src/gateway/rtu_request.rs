@@ -48,7 +48,7 @@ pub(super) fn first<'b>(bytes: &'b [u8], looked: &mut Looked) -> Result<Option<(
             Some(frame) => Frame::parse(frame).map(|_| length).map_err(|_| NotModbus::Crc)?,
         },
         // A function whose length is not known ends where a CRC says so.
-        FrameLength::Unknown | FrameLength::Never => match looked.end(&bytes[..most]) {
+        _ => match looked.end(&bytes[..most]) {
             Some(length) => length,
             None if bytes.len() < MAX_ADU => return Ok(None),
             None => return Err(NotModbus::Crc),

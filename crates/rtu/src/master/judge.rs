@@ -91,9 +91,7 @@ impl Master {
                             return Some(Event::Wrong { error: AnswerError::Refusal { code }, frame });
                         }
                         // Nothing tells whose words these are.
-                        Ok(Answer::Read { .. } | Answer::ReadWrite { .. })
-                            if self.others.ask(now, unit, expected).is_some() =>
-                        {
+                        Ok(Answer::Read { .. } | Answer::ReadWrite { .. }) if self.is_anybodys(now, unit, expected) => {
                             self.give_account(false);
                             self.state = State::Idle;
                             self.hear(now, range.clone());
@@ -292,6 +290,11 @@ impl Master {
         let Some(late) = late else { return false };
         self.torn.notes(now, late);
         true
+    }
+
+    /// Whether words that come for `expected` may be those that another master asked for.
+    fn is_anybodys(&self, now: Instant, unit: UnitAddress, expected: Expected) -> bool {
+        self.others.ask(now, unit, expected).is_some()
     }
 
     /// Whether `frame` is the answer to something that its unit left open.

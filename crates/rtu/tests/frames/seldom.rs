@@ -47,6 +47,8 @@ fn coils_are_written_as_the_specification_has_it() {
     assert_eq!(put(&Answer::confirming(&request).unwrap()), answer);
     let wrong = request.judge(&[0x0F, 0x00, 0x13, 0x00, 0x0B]);
     assert_eq!(wrong, Err(AnswerError::Echo { asked: [0x13, 10], came: [0x13, 11] }));
+    let filled = [0x0F, 0x00, 0x13, 0x00, 0x0A, 0x02, 0xCD, 0x05];
+    assert_eq!(Request::raw(&filled, None), Request::custom(&filled, AnswerLength::BySilence), "goes out as it is");
     for (address, count) in [(0, 0), (0, 1_969), (0xFFFF, 2)] {
         assert!(Request::write_coils(address, &vec![1; count]).is_err(), "{count} at {address}");
     }

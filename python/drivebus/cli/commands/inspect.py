@@ -141,7 +141,7 @@ def info(session: Session) -> None:
         try:
             drive = session.drive_on(bus)
         except drivebus.NotAllowed:
-            session.out.render(identity)
+            session.out.render(replace(identity, device=_device(bus, found)))
             raise
         control = drive.check_control()
         contradiction = drive.contradiction()
@@ -152,6 +152,16 @@ def info(session: Session) -> None:
         remark(f"{against[0].upper()}{against[1:]}. Until then nothing is written to it.")
     elif found.candidates and known.profile.family not in found.candidates and known.profile.identifications():
         remark(f"Using profile {known.profile.name}; the drive does not report its family.")
+
+
+def _device(bus: drivebus.Bus, found: drivebus.Identification) -> drivebus.DeviceIdentification | None:
+    """Who made a unit of which nothing else is known, if it says so; no other is asked."""
+    if found.candidates:
+        return None
+    try:
+        return bus.device_identification(found.unit)
+    except (drivebus.Refused, drivebus.NoAnswer, drivebus.BadAnswer):
+        return None
 
 
 def _round_trip(bus: drivebus.Bus, unit: int) -> float | None:

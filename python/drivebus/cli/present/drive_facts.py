@@ -24,11 +24,13 @@ class Identity:
         found: What it was identified as.
         port: Where it hangs.
         line: The settings of the line, such as `19200 8E1`.
+        device: Who made it, by its own words; None unless that was asked and told.
     """
 
     found: drivebus.Identification
     port: str
     line: str
+    device: drivebus.DeviceIdentification | None = None
 
     def facts(self) -> dict[str, Any]:
         """What is known of it, by name."""
@@ -38,6 +40,7 @@ class Identity:
             "certainty": self.found.certainty,
             "reason": self.found.reason,
             "may_be": self.found.candidates,
+            **({} if self.device is None else _made(self.device)),
             "port": self.port,
             "line": self.line,
         }
@@ -53,6 +56,13 @@ class Identity:
     def lay_out(self, out: Output) -> None:
         """The same."""
         out.facts(self.facts_in_words())
+
+
+def _made(device: drivebus.DeviceIdentification) -> dict[str, str]:
+    """Who made it, and what it is, as far as it says so."""
+    product = [device.product_name or device.model_name, device.product_code, device.revision]
+    told = {"vendor": device.vendor, "product": ", ".join(text for text in product if text)}
+    return {name: text for name, text in told.items() if text}
 
 
 @dataclass(frozen=True)
