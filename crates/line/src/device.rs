@@ -163,7 +163,7 @@ mod tests {
         let objects: &[(u8, &[u8])] =
             &[(0, b"Example "), (1, b"EX-1\0"), (2, b"V2.11"), (5, &long), (0x80, &long), (0xFF, &[0, 0xFE])];
         let (told, asked) = ask(objects);
-        assert_eq!((told.is_complete(), asked), (true, 3));
+        assert_eq!((told.is_complete(), asked), (true, 2));
         assert_eq!(told.conformity(), 0x83);
         assert_eq!((told.vendor().as_deref(), told.product_code().as_deref()), (Some("Example"), Some("EX-1")));
         assert_eq!((told.revision().as_deref(), told.vendor_url()), (Some("V2.11"), None));

@@ -38,6 +38,8 @@ pub enum FrameLength {
     Later,
     /// None does.
     Never,
+    /// More than a frame can have.
+    TooLong,
     /// Its own bytes do not tell.
     Unknown,
 }
@@ -82,7 +84,7 @@ impl FrameLength {
             ENCAPSULATED => match here.get(2) {
                 None => Self::Later,
                 Some(&IDENTIFICATION) => match identification::len(&here[1..]) {
-                    Some(len) if 1 + len + CRC_LEN > MAX_ADU => Self::Never,
+                    Some(len) if 1 + len + CRC_LEN > MAX_ADU => Self::TooLong,
                     Some(len) => Self::Is(1 + len + CRC_LEN),
                     None => Self::Later,
                 },
@@ -98,7 +100,7 @@ impl FrameLength {
     pub const fn bytes(self) -> Option<usize> {
         match self {
             Self::Is(bytes) => Some(bytes),
-            Self::Later | Self::Never | Self::Unknown => None,
+            Self::Later | Self::Never | Self::TooLong | Self::Unknown => None,
         }
     }
 }
@@ -135,7 +137,7 @@ fn counted(here: &[u8], index: usize, around: usize) -> FrameLength {
     match here.get(index) {
         None => FrameLength::Later,
         Some(0) => FrameLength::Never,
-        Some(bytes) if around + usize::from(*bytes) > MAX_ADU => FrameLength::Never,
+        Some(bytes) if around + usize::from(*bytes) > MAX_ADU => FrameLength::TooLong,
         Some(bytes) => FrameLength::Is(around + usize::from(*bytes)),
     }
 }

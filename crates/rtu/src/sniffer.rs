@@ -288,7 +288,7 @@ impl Sniffer {
                     Look::Wait => wait = true,
                     Look::Nothing(why) => error = error.or(why),
                 },
-                FrameLength::Unknown | FrameLength::Never => {}
+                FrameLength::Unknown | FrameLength::Never | FrameLength::TooLong => {}
             }
         }
         if wait && !is_over { Look::Wait } else { Look::Nothing(error) }

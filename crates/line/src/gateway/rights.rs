@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 
-use drivebus_rtu::{Destination, ExceptionCode, Request, Table, Touched, UnitAddress};
+use drivebus_rtu::{AnswerLength, Destination, ExceptionCode, Request, Table, Touched, UnitAddress};
 
 use crate::gateway::network::Network;
 use crate::options::LastWill;
@@ -278,9 +278,17 @@ impl Rights {
     }
 }
 
-/// The request that `pdu` is, in the form of the specification.
+/// The request that `pdu` is, in the form of the specification; one that switches several coils (§6.11) is answered by five
+/// bytes.
 pub(super) fn request_of(pdu: &[u8]) -> Option<Request<'_>> {
-    Request::parse(pdu).ok().filter(|request| !(pdu[0] == WRITE_COILS && matches!(request, Request::Custom { .. })))
+    let &[WRITE_COILS, ref rest @ ..] = pdu else { return Request::parse(pdu).ok() };
+    let &[a1, a0, c1, c0, bytes, ref data @ ..] = rest else { return None };
+    let (address, count) = (u16::from_be_bytes([a1, a0]), u16::from_be_bytes([c1, c0]));
+    let is_whole = (1..=1968).contains(&count)
+        && u32::from(address) + u32::from(count) <= 0x1_0000
+        && data.len() == usize::from(bytes)
+        && data.len() == usize::from(count).div_ceil(8);
+    is_whole.then(|| Request::custom(pdu, AnswerLength::Bytes(5)).ok()).flatten()
 }
 
 #[cfg(test)]

@@ -43,6 +43,7 @@ pub(super) fn first<'b>(bytes: &'b [u8], looked: &mut Looked) -> Result<Option<(
     let most = bytes.len().min(MAX_ADU);
     let found = match FrameLength::of_request(bytes) {
         FrameLength::Later => return Ok(None),
+        FrameLength::TooLong => return Err(NotModbus::Crc),
         FrameLength::Is(length) => match bytes.get(..length) {
             None => return Ok(None),
             Some(frame) => Frame::parse(frame).map(|_| length).map_err(|_| NotModbus::Crc)?,

@@ -107,7 +107,7 @@ pub(crate) fn can_ask(frame: &[u8]) -> bool {
     match FrameLength::of_request(frame) {
         FrameLength::Is(len) => len == frame.len() && Request::parse(pdu(frame)).is_ok(),
         FrameLength::Unknown => true,
-        FrameLength::Later | FrameLength::Never => false,
+        FrameLength::Later | FrameLength::Never | FrameLength::TooLong => false,
     }
 }
 
@@ -116,7 +116,7 @@ pub(crate) fn may_be_answer(frame: &[u8]) -> bool {
     match FrameLength::of_answer(frame) {
         FrameLength::Is(len) => len == frame.len(),
         FrameLength::Unknown => true,
-        FrameLength::Later | FrameLength::Never => false,
+        FrameLength::Later | FrameLength::Never | FrameLength::TooLong => false,
     }
 }
 
