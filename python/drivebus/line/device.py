@@ -50,4 +50,17 @@ class DeviceIdentification:
 def device_of(unit: int, question: _native.DeviceQuestion) -> DeviceIdentification:
     """What *unit* told to *question*."""
     conformity, complete, texts, objects = question.told()
-    return DeviceIdentification(unit, *texts, MappingProxyType(objects), conformity, complete)
+    vendor, product_code, revision, vendor_url, product_name, model_name, application_name = texts
+    return DeviceIdentification(
+        unit=unit,
+        vendor=vendor,
+        product_code=product_code,
+        revision=revision,
+        vendor_url=vendor_url,
+        product_name=product_name,
+        model_name=model_name,
+        application_name=application_name,
+        objects=MappingProxyType(objects),
+        conformity=conformity,
+        complete=complete,
+    )

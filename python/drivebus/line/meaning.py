@@ -90,7 +90,7 @@ def _seldom_answer(pdu: bytes, asked: bytes | None, profile: Profile | None) -> 
             return f"answers {_values(_word(asked, 2), words, profile)}"
         case b"\x2b":
             objects = _native.device_objects(pdu)
-            return objects and f"says that it is {', '.join(_object(*told) for told in objects)}"
+            return f"says that it is {', '.join(_object(*told) for told in objects)}" if objects else None
     return None
 
 

@@ -22,7 +22,7 @@ def say_ready(connected: bool) -> None:
 async def main() -> None:
     """Serves until it is ended."""
     registers = SimData(0, values=list(range(0x400)), datatype=DataType.REGISTERS)
-    identity = ModbusDeviceIdentification(info={0: "pymodbus", 1: "PM", 2: "3.x", 4: "a slave of others"})
+    identity = ModbusDeviceIdentification(info={0: "pymodbus", 1: "PM", 2: "3.x", 4: "a slave of others"})  # type: ignore[no-untyped-call]
     for own in (0x80, 0x90):
         identity[own] = chr(own - 0x40) * 120
     server = ModbusSerialServer(
