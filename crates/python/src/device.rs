@@ -15,6 +15,9 @@ pub(crate) fn device_objects<'py>(py: Python<'py>, pdu: &[u8]) -> Option<Vec<(u8
     Some(page.objects().map(|(object, value)| (object, PyBytes::new(py, value))).collect())
 }
 
+/// Conformity, whether that is all, the first seven objects as text, and all as bytes.
+type Told<'py> = (u8, bool, Vec<Option<String>>, Bound<'py, PyDict>);
+
 /// What to ask a unit next for its identification.
 #[pyclass(frozen, module = "drivebus._native")]
 pub(crate) struct DeviceQuestion(Mutex<line::DeviceQuestion>);
@@ -43,8 +46,8 @@ impl DeviceQuestion {
         self.with(|question| question.refused(ExceptionCode(code)))
     }
 
-    /// What came: conformity, whether that is all, the first seven objects as text, and all as bytes.
-    fn told<'py>(&self, py: Python<'py>) -> PyResult<(u8, bool, Vec<Option<String>>, Bound<'py, PyDict>)> {
+    /// What came.
+    fn told<'py>(&self, py: Python<'py>) -> PyResult<Told<'py>> {
         let told = self.with(|question| question.clone().told());
         let objects = PyDict::new(py);
         for (object, value) in told.objects() {
