@@ -416,7 +416,7 @@ class Bus:
         *,
         timeout: float | None = None,
         in_doubt: bool = False,
-        retries: int | None = 0,
+        retries: int | None = ...,
     ) -> bytes:
         """Any PDU out, the answer's PDU back. *reply_length* is the length of that PDU, if known.
 
@@ -508,7 +508,7 @@ class Requests:
         *,
         timeout: float | None = None,
         in_doubt: bool = False,
-        retries: int | None = 0,
+        retries: int | None = ...,
     ) -> Asked[bytes]: ...
     def halts(self, unit: int, /) -> Asked[int]: ...
     def link(self, unit: int, /) -> Asked[tuple[int, int]]: ...

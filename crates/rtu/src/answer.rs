@@ -1,6 +1,6 @@
 //! What a unit answers: the PDUs of answers, built and parsed. What is right as the answer to what, `expected` tells.
 
-mod error;
+pub(crate) mod error;
 mod head;
 mod seldom;
 

@@ -24,8 +24,8 @@ use crate::frame::{Frame, MAX_ADU};
 use crate::identification;
 use crate::pdu::CRC_LEN;
 use crate::pdu::function::{
-    DIAGNOSTICS, ENCAPSULATED, EXCEPTION_BIT, IDENTIFICATION, MASK_WRITE, READ_COILS, READ_INPUT, READ_WRITE,
-    REPORT_SERVER_ID, WRITE_COILS, WRITE_MULTIPLE,
+    DIAGNOSTICS, ENCAPSULATED, EXCEPTION_BIT, IDENTIFICATION, MASK_WRITE, READ_WRITE, REPORT_SERVER_ID, WRITE_COILS,
+    WRITE_MULTIPLE,
 };
 
 /// How long the frame is that begins so.
@@ -103,16 +103,6 @@ impl FrameLength {
             Self::Later | Self::Never | Self::TooLong | Self::Unknown => None,
         }
     }
-}
-
-/// Whether the request `pdu` is of a function that only reads.
-pub(crate) const fn reads(pdu: &[u8]) -> bool {
-    matches!(
-        pdu,
-        [READ_COILS..=READ_INPUT | 0x07 | 0x0B | 0x0C | REPORT_SERVER_ID | 0x14 | 0x18, ..]
-            | [DIAGNOSTICS, 0, 0x00 | 0x02 | 0x0B..=0x12, ..]
-            | [ENCAPSULATED, IDENTIFICATION, ..]
-    )
 }
 
 /// How many bytes at the front of `here` are a whole frame of a function that tells its length, as a request or as an

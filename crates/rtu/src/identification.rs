@@ -12,17 +12,17 @@
 //!
 //! Source: *Modbus Application Protocol* V1.1b3, §6.21.
 
-use crate::answer::{Answer, AnswerError};
+use crate::answer::error::AnswerError;
+use crate::pdu::MAX_PDU;
 use crate::pdu::function::{ENCAPSULATED, IDENTIFICATION};
-use crate::pdu::{ExceptionCode, MAX_PDU};
 
 /// Bytes before the first object.
-const HEAD: usize = 7;
+pub(crate) const HEAD: usize = 7;
 /// Number and length of an object.
-const OBJECT_HEAD: usize = 2;
-const MORE: u8 = 0xFF;
+pub(crate) const OBJECT_HEAD: usize = 2;
+pub(crate) const MORE: u8 = 0xFF;
 /// The bit of a conformity that says that single objects can be asked for.
-const INDIVIDUAL: u8 = 0x80;
+pub(crate) const INDIVIDUAL: u8 = 0x80;
 
 /// How much of the identification is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -57,7 +57,7 @@ impl IdentificationLevel {
     }
 
     /// The last object that an answer can have.
-    const fn last(self) -> u8 {
+    pub(crate) const fn last(self) -> u8 {
         match self {
             Self::Basic => 0x02,
             Self::Regular => 0x7F,
@@ -162,49 +162,6 @@ impl<'a> IdentificationPage<'a> {
     /// Function code and data.
     pub const fn pdu(&self) -> &'a [u8] {
         self.pdu
-    }
-
-    /// What a unit that has `objects`, in the order of their numbers, answers to the question for `level` from `object` on: as
-    /// many of them as fit into `buffer`, or the exception 02H where one that it has not is asked for alone. None may have more
-    /// than 244 bytes.
-    pub fn answer<'b>(
-        objects: &[(u8, &[u8])],
-        (level, object): (IdentificationLevel, u8),
-        buffer: &'b mut [u8; MAX_PDU],
-    ) -> Answer<'b> {
-        let refused = Answer::exception(ENCAPSULATED, ExceptionCode::ILLEGAL_ADDRESS);
-        let has = |number| objects.iter().any(|&(own, _)| own == number);
-        if level == IdentificationLevel::One && !has(object) {
-            return refused;
-        }
-        let last = if level == IdentificationLevel::One { object } else { level.last() };
-        let first = if has(object) && object <= last { object } else { 0 };
-        let conformity = match objects.last() {
-            Some((0x80.., _)) => IdentificationLevel::Extended,
-            Some((0x03.., _)) => IdentificationLevel::Regular,
-            _ => IdentificationLevel::Basic,
-        };
-        let head = [ENCAPSULATED, IDENTIFICATION, level.code(), conformity.code() | INDIVIDUAL, 0, 0, 0];
-        buffer[..HEAD].copy_from_slice(&head);
-        let mut end = HEAD;
-        for &(number, value) in objects.iter().filter(|(number, _)| (first..=last).contains(number)) {
-            let place = buffer.get_mut(end..end + OBJECT_HEAD + value.len());
-            let (Some(place), Ok(len)) = (place, u8::try_from(value.len())) else {
-                // One that no answer can carry is none that the unit has.
-                if end > HEAD {
-                    (buffer[4], buffer[5]) = (MORE, number);
-                }
-                break;
-            };
-            place[..OBJECT_HEAD].copy_from_slice(&[number, len]);
-            place[OBJECT_HEAD..].copy_from_slice(value);
-            buffer[6] += 1;
-            end += OBJECT_HEAD + value.len();
-        }
-        match IdentificationPage::parse(&buffer[..end]) {
-            Ok(page) => Answer::Identification { page },
-            Err(_) => refused,
-        }
     }
 }
 

@@ -125,3 +125,15 @@ pub(crate) fn put_words(target: &mut [u8; MAX_PDU], function: u8, [first, second
     target[3..5].copy_from_slice(&second.to_be_bytes());
     5
 }
+
+/// Whether the request `pdu` is of a function that only reads; `functions` has the table.
+pub(crate) const fn reads(pdu: &[u8]) -> bool {
+    use function::{DIAGNOSTICS, ENCAPSULATED, IDENTIFICATION, READ_COILS, READ_INPUT, REPORT_SERVER_ID};
+
+    matches!(
+        pdu,
+        [READ_COILS..=READ_INPUT | 0x07 | 0x0B | 0x0C | REPORT_SERVER_ID | 0x14 | 0x18, ..]
+            | [DIAGNOSTICS, 0, 0x00 | 0x02 | 0x0B..=0x12, ..]
+            | [ENCAPSULATED, IDENTIFICATION, ..]
+    )
+}

@@ -6,7 +6,6 @@ mod seldom;
 
 use core::fmt;
 
-use crate::functions::reads;
 use crate::identification::IdentificationLevel;
 use crate::pdu::function::{
     DIAGNOSTICS, ENCAPSULATED, EXCEPTION_BIT, MASK_WRITE, READ_COILS, READ_INPUT, READ_WRITE, REPORT_SERVER_ID,
@@ -14,7 +13,7 @@ use crate::pdu::function::{
 };
 use crate::pdu::{
     AROUND_PDU, AnswerLength, MAX_PDU, MAX_READ, MAX_READ_WRITE, MAX_WRITE, MAX_WRITE_BITS, coil_of, coil_word,
-    put_words,
+    put_words, reads,
 };
 use crate::{Table, Words};
 

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from drivebus._native import read_sheet
 from drivebus.cli.wrong_use import WrongUse
+from drivebus.record.sheets import read_sheet
 
 __all__ = ["COUNTS", "ManualTable", "TableRow"]
 

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from drivebus import checks
-from drivebus._native import read_sheet
 from drivebus.errors import BadArgument, NotAllowed
 from drivebus.record.formats import format_of
+from drivebus.record.sheets import read_sheet
 from drivebus.record.table import ELAPSED, FIXED, seconds_of
 
 __all__ = ["Event", "Recording", "read"]

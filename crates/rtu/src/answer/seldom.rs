@@ -4,9 +4,9 @@
 
 use super::Answer;
 use crate::Words;
-use crate::identification::IdentificationPage;
-use crate::pdu::function::{ENCAPSULATED, MASK_WRITE, READ_WRITE, REPORT_SERVER_ID, WRITE_COILS};
-use crate::pdu::{MAX_PDU, MAX_READ, put_words};
+use crate::identification::{HEAD, INDIVIDUAL, IdentificationLevel, IdentificationPage, MORE, OBJECT_HEAD};
+use crate::pdu::function::{ENCAPSULATED, IDENTIFICATION, MASK_WRITE, READ_WRITE, REPORT_SERVER_ID, WRITE_COILS};
+use crate::pdu::{ExceptionCode, MAX_PDU, MAX_READ, put_words};
 
 impl<'a> Answer<'a> {
     /// The answer of a function that few units know, if it is as the specification has it.
@@ -59,6 +59,51 @@ impl<'a> Answer<'a> {
                 pdu.len()
             }
             _ => 0,
+        }
+    }
+}
+
+impl IdentificationPage<'_> {
+    /// What a unit that has `objects`, in the order of their numbers, answers to the question for `level` from `object` on: as
+    /// many of them as fit into `buffer`, or the exception 02H where one that it has not is asked for alone. None may have more
+    /// than 244 bytes.
+    pub fn answer<'b>(
+        objects: &[(u8, &[u8])],
+        (level, object): (IdentificationLevel, u8),
+        buffer: &'b mut [u8; MAX_PDU],
+    ) -> Answer<'b> {
+        let refused = Answer::exception(ENCAPSULATED, ExceptionCode::ILLEGAL_ADDRESS);
+        let has = |number| objects.iter().any(|&(own, _)| own == number);
+        if level == IdentificationLevel::One && !has(object) {
+            return refused;
+        }
+        let last = if level == IdentificationLevel::One { object } else { level.last() };
+        let first = if has(object) && object <= last { object } else { 0 };
+        let conformity = match objects.last() {
+            Some((0x80.., _)) => IdentificationLevel::Extended,
+            Some((0x03.., _)) => IdentificationLevel::Regular,
+            _ => IdentificationLevel::Basic,
+        };
+        let head = [ENCAPSULATED, IDENTIFICATION, level.code(), conformity.code() | INDIVIDUAL, 0, 0, 0];
+        buffer[..HEAD].copy_from_slice(&head);
+        let mut end = HEAD;
+        for &(number, value) in objects.iter().filter(|(number, _)| (first..=last).contains(number)) {
+            let place = buffer.get_mut(end..end + OBJECT_HEAD + value.len());
+            let (Some(place), Ok(len)) = (place, u8::try_from(value.len())) else {
+                // One that no answer can carry is none that the unit has.
+                if end > HEAD {
+                    (buffer[4], buffer[5]) = (MORE, number);
+                }
+                break;
+            };
+            place[..OBJECT_HEAD].copy_from_slice(&[number, len]);
+            place[OBJECT_HEAD..].copy_from_slice(value);
+            buffer[6] += 1;
+            end += OBJECT_HEAD + value.len();
+        }
+        match IdentificationPage::parse(&buffer[..end]) {
+            Ok(page) => Answer::Identification { page },
+            Err(_) => refused,
         }
     }
 }
