@@ -145,6 +145,7 @@ def test_a_stop_is_sent_before_anything_is_loaded_that_it_does_not_need() -> Non
     assert ours(modules, "drivebus.backup") == {"drivebus.backup", "drivebus.backup.drive_backup"}
     assert not ours(modules, "drivebus.aio") | ours(modules, "drivebus.doctor") | ours(modules, "drivebus.rtu")
     assert not modules & {f"drivebus.values.{name}" for name in ("control", "descriptions", "snapshots", "status")}
+    assert "drivebus.line.device" not in modules
 
 
 def test_a_port_that_is_named_loads_no_simulator() -> None:

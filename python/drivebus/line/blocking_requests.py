@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from drivebus import _native, checks, tables
 from drivebus.errors import BadArgument, Refused
-from drivebus.line.device import DeviceIdentification, device_of
 from drivebus.line.units import Units
 
 if TYPE_CHECKING:
+    from drivebus.line.device import DeviceIdentification
     from drivebus.line.stats import Link
 
 __all__ = ["Requests", "alone_of", "broadcast_of", "echo_of", "read_of", "seconds_of", "transact_of", "write_of"]
@@ -207,6 +207,8 @@ class Requests:
             Refused: Most units do not know the function, and refuse it with 01H.
             NoAnswer, BadAnswer, PortError: The unit did not tell.
         """
+        from drivebus.line.device import device_of
+
         unit, question = self._known.addresses.unit(unit), _native.DeviceQuestion()
         while (pdu := question.pdu()) is not None:
             try:
