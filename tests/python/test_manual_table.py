@@ -125,6 +125,33 @@ def test_a_range_that_does_not_fit_its_step_is_left_to_the_note(tmp_path: Path) 
     ]
 
 
+def test_names_that_are_alike_are_numbered_in_their_order() -> None:
+    rows = "".join(f"{address:04X},Value 2\n" for address in range(3000)) + "F000,Value 2 17\n"
+    names = [row.name for row in ManualTable(f"Address (hex),Name\n{rows}".encode()).rows]
+    assert (names[:3], names[2999], names[3000]) == (
+        ["value_2", "value_2_2", "value_2_3"],
+        "value_2_3000",
+        "value_2_17_2",
+    )
+
+
+@pytest.mark.parametrize("source", ["A1 manual,\np. 42", " A1 manual,\t\np. 42 "])
+def test_a_source_is_one_line(tmp_path: Path, source: str) -> None:
+    text = "Address (hex),Name,Unit,Range\n2000,A,1V,0-99999\n2001,B,1V,0-5\n2002,C,1V,0-99999\n"
+    assert new(tmp_path, text, "--source", source).exit_code == 0
+    assert [(row["high"], row["source"]) for row in rows(tmp_path)] == [
+        ("", "A1 manual, p. 42"),
+        ("5", "A1 manual, p. 42"),
+        ("", "A1 manual, p. 42"),
+    ]
+
+
+def test_a_source_that_says_nothing_is_none(tmp_path: Path) -> None:
+    done = new(tmp_path, ACME, "--source", " ")
+    assert (done.exit_code, "give --table with --source" in done.stderr) == (2, True)
+    assert not (tmp_path / "acme").exists()
+
+
 @given(st.lists(st.lists(st.text(max_size=12), min_size=2, max_size=6), max_size=12))
 def test_no_table_brings_it_down(cells: list[list[str]]) -> None:
     text = "Address (hex),Name,Unit,Range,R/W\n" + "\n".join(",".join(row) for row in cells)

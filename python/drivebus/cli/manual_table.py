@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -99,6 +100,7 @@ class ManualTable:
         """
         titles, rows = read_sheet(data, titles_of(data))
         self._places = _columns(titles)
+        self._names: dict[str, int] = {}
         self.rows: list[TableRow] = []
         self.left_out: list[tuple[int, str]] = []
         cells = [(line, dict(self._cells(row))) for line, row in rows]
@@ -136,8 +138,12 @@ class ManualTable:
         words = re.findall(r"[a-z0-9]+", re.sub(r"\(.*?\)", " ", label.lower()))[:5]
         name = "_".join(words)[:40].strip("_") or "register"
         name = name if name[0].isalpha() else f"r_{name}"
-        taken = {row.name for row in self.rows}
-        return next(new for new in (name, *(f"{name}_{number}" for number in range(2, 10_000))) if new not in taken)
+        numbered = (f"{name}_{number}" for number in itertools.count(self._names.get(name, 1) + 1))
+        new = name if name not in self._names else next(each for each in numbered if each not in self._names)
+        # How often it was asked for is where to go on with the numbers.
+        self._names[name] = self._names.get(name, 0) + 1
+        self._names.setdefault(new, 1)
+        return new
 
     def give_up(self, line: int, reason: str) -> None:
         """What stands in *line* of `csv` cannot be: its range goes into its note; where it has none, the row goes."""

@@ -100,7 +100,9 @@ def new(
     """
     if (like is not None) + (overlay is not None) + (table is not None) > 1:
         raise WrongUse("give one of --like, --overlay and --table: a profile is a copy, an overlay, or new")
-    if (table is None) != (source is None) or (table is None and addresses is not None):
+    # A row names its source in one line.
+    source = None if source is None else " ".join(source.split())
+    if (table is None) != (not source) or (table is None and addresses is not None):
         raise WrongUse("give --table with --source, the manual and its page: each row names where it is printed")
     base = like or overlay
     if base is not None:
@@ -108,7 +110,7 @@ def new(
     try:
         name = folder.resolve().name
         read = None if table is None else ManualTable(table.read_bytes(), count=addresses)
-        if read is None or source is None:
+        if read is None or not source:
             written = profile_template.files(name, like=like, overlay=overlay)
         else:
             written = profile_template.files_of_table(name, read, source)
