@@ -6,14 +6,12 @@ A `Text` is a str in Python's words. A program that has others, such as a comman
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 __all__ = ["Advice", "Text", "argument", "call", "joined"]
 
 
-@dataclass(frozen=True)
-class Advice:
+class Advice(NamedTuple):
     """A call or an argument that helps.
 
     Attributes:

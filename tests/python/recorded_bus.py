@@ -13,7 +13,6 @@ from __future__ import annotations
 import struct
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
 from typing import Any, TypeAlias, overload
 
 from drivebus import errors
@@ -198,7 +197,7 @@ class Noting(Telling):
             words = (await self._bus.ask_stamped(sent)).words if stamped else await self._bus.ask(sent)
             return "".join(f"{word:04X}" for word in self._after(request, words))
         if isinstance(sent, Write) and sent.halts is not None:
-            sent = replace(sent, halts=sent.halts + (self._first_halts or 0))
+            sent = sent._replace(halts=sent.halts + (self._first_halts or 0))
         await self._bus.ask(sent)
         return _NOTHING
 

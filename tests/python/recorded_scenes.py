@@ -10,7 +10,7 @@ import zlib
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from drivebus import Bus, DrivebusError, Profile, Simulator, profiles
@@ -91,7 +91,7 @@ class Stage:
             self.counts = Counts(number + 1, number if first is None else first, number)
         else:
             self.counts = self.counts._replace(requests=number + 1)
-        return replace(request, unit=_OTHER_UNIT) if number >= self.moved_at else request
+        return request._replace(unit=_OTHER_UNIT) if number >= self.moved_at else request
 
     def after(self, read: Read, words: Sequence[int]) -> list[int]:
         """What is taken for the answer to *read* where *words* came."""

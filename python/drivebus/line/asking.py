@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, overload
 
 from drivebus import tables
@@ -11,8 +10,7 @@ from drivebus import tables
 __all__ = ["Ask", "Asks", "Read", "Stamped", "Write", "asking"]
 
 
-@dataclass(frozen=True, slots=True)
-class Read:
+class Read(NamedTuple):
     """A read of words, or of bits.
 
     Attributes:
@@ -28,7 +26,7 @@ class Read:
 
     unit: int
     address: int
-    count: int = 1
+    count: int = 1  # type: ignore[assignment]  # nobody counts in a read as in a tuple
     table: str = "holding"
     urgent: bool = False
     verify: bool = False
@@ -50,8 +48,7 @@ class Read:
         return f"{what} of unit {self.unit}{how}"
 
 
-@dataclass(frozen=True, slots=True)
-class Write:
+class Write(NamedTuple):
     """A write of words, or of one coil. It is sent once.
 
     Attributes:
@@ -122,4 +119,4 @@ class Asks(Protocol):
 
 def asking(bus: Asks, **how: Any) -> Ask:
     """What asks *bus*, where each read is to be so as *how* says, in the names of its attributes."""
-    return lambda read: bus.ask(replace(read, **how))
+    return lambda read: bus.ask(read._replace(**how))

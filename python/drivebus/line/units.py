@@ -20,7 +20,7 @@ from drivebus.values import State
 __all__ = ["UnitRecord", "Units", "belongs", "units_of"]
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(slots=True, eq=False, repr=False)
 class UnitRecord:
     """What is known of one unit.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from drivebus import checks
 from drivebus.identify.same_unit import SameUnit
@@ -14,7 +14,6 @@ from drivebus.profile.evidence import Evidence
 __all__ = ["DriveView", "Taken"]
 
 
-@dataclass(slots=True)
 class Taken:
     """What the drive took of one call.
 
@@ -22,11 +21,13 @@ class Taken:
         writes: How many writes it confirmed.
     """
 
-    writes: int = 0
+    __slots__ = ("writes",)
+
+    def __init__(self) -> None:
+        self.writes = 0
 
 
-@dataclass(frozen=True, slots=True)
-class DriveView:
+class DriveView(NamedTuple):
     """One drive as one call sees it. Another bus or more trust make another view of the same record.
 
     Attributes:
@@ -74,19 +75,19 @@ class DriveView:
 
     def with_bus(self, bus: AwaitableBus) -> DriveView:
         """The same unit over another face of the same line."""
-        return replace(self, bus=bus)
+        return self._replace(bus=bus)
 
     def trusting(self, unverified: bool) -> DriveView:
         """The same unit; if *unverified*, what is not verified is done all the same."""
         if not checks.flag("unverified", unverified) or self.unverified:
             return self
-        return replace(self, evidence=self.evidence.trusting(True))
+        return self._replace(evidence=self.evidence.trusting(True))
 
     def taken_for(self, profile: Profile) -> DriveView:
         """The same unit, which shows that it is of *profile* and not what it was named as; trusted as that."""
         identity = SameUnit(self.bus, self.record, profile)
-        return replace(self, evidence=Evidence(profile, self.address, True), identity=identity)
+        return self._replace(evidence=Evidence(profile, self.address, True), identity=identity)
 
     def with_profile(self, profile: Profile) -> DriveView:
         """The same unit, whose words are known better: by *profile*."""
-        return replace(self, evidence=self.evidence.of(profile))
+        return self._replace(evidence=self.evidence.of(profile))

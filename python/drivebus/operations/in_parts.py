@@ -8,7 +8,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from drivebus.errors import DrivebusError
@@ -41,7 +40,7 @@ def counted(unit: DriveView) -> Iterator[DriveView]:
         return
     taken = Taken()
     try:
-        yield replace(unit, taken=taken)
+        yield unit._replace(taken=taken)
     except DrivebusError as error:
         error.in_part = taken.writes > 0
         raise

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from drivebus import _native, checks
 from drivebus.errors import BadArgument, DrivebusError
@@ -36,8 +35,7 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, slots=True)
-class SetpointRange:
+class SetpointRange(NamedTuple):
     """Frequency setpoints that one drive takes, from *low* to *high* Hz, as `Drive.check_setpoints` found out.
 
     Attributes:
