@@ -146,11 +146,11 @@ def test_the_command_names_it(as_json: bool) -> None:
     words = ["--json"] * as_json
     with on_a_terminal(Drive().answer) as path:
         line = ["--port", path, "--baud", "115200"]
-        told = CliRunner().invoke(cli, [*words, *line, "scan", "--units", "1-3", "--timeout", "0.3"])
+        told = CliRunner().invoke(cli, [*words, *line, "scan", "--units", "1", "--timeout", "1.0"])
         assert told.exit_code == 0, told.output
-        alone = CliRunner().invoke(cli, [*line, "scan", "--units", "1-3", "--timeout", "0.3", "--protocol", "modbus"])
+        alone = CliRunner().invoke(cli, [*line, "scan", "--units", "1", "--timeout", "1.0", "--protocol", "modbus"])
         assert alone.exit_code == 3
-        again = ["scan", "--units", "1-3", "--timeout", "0.3", "--protocol", "huanyang"]
+        again = ["scan", "--units", "1", "--timeout", "1.0", "--protocol", "huanyang"]
         assert CliRunner().invoke(cli, [*line, *again]).exit_code == 0
     if as_json:
         assert json.loads(told.stdout)["protocol"] == "huanyang"
