@@ -1,12 +1,11 @@
 """A program that runs a motor is killed: who has the port halts the drive, and nobody else feeds its time-out before.
 
 Real programs on one pseudo-terminal, whose drive has its own process, its own motor and its own bus time-out: what it
-says of them counts (`workshop`).
+says of them counts (`workshop`). How long a halt takes is told by `tools/measure_ends.py`, and not judged here.
 """
 
 from __future__ import annotations
 
-import itertools
 import os
 import signal
 import struct
@@ -73,8 +72,6 @@ say("open")
 time.sleep(1000)
 """
 )
-WITHIN = 0.2
-"""Seconds from the end of a program to the first halt on the wire."""
 QUESTION = "010321030001"
 
 
@@ -135,7 +132,6 @@ def test_a_guest_that_is_killed_is_halted_for_by_the_owner(shop: Workshop, runs:
         halt = shop.wait_for(is_halt, killed)
         stood = shop.wait_for(stands, killed)
         print(f"kill to halt {halt.at - killed:.3f} s, to standing {stood.at - killed:.3f} s")
-        assert halt.at - killed < WITHIN
         assert stood.what == ("5" if runs is RUNS else "6"), "by the block's stop; a watchdog was told to coast"
         shop.wait_for(asks_the_state, halt.at)
         assert [said.is_halt for said in shop.frames(killed)].count(True) == 1, "once, as it was taken"
@@ -147,7 +143,6 @@ def test_an_owner_that_is_killed_is_halted_for_by_who_comes_after_it_first_of_al
         killed = kill(owner)
         halt = shop.wait_for(is_halt, killed)
         print(f"kill to halt {halt.at - killed:.3f} s")
-        assert halt.at - killed < WITHIN
         shop.wait_for(stands, killed)
         shop.wait_for(asks_the_state, halt.at)
         # What was on its way when it was killed may still come; then who takes the port over is silent for a moment.
@@ -183,7 +178,6 @@ def test_until_it_takes_a_halt_nobody_else_asks_it(shop: Workshop) -> None:
         between = [said.what for said in shop.frames(halts[0].at) if said.at < halts[-1].at]
         assert set(between) == {"010620000005", "010620000006"}, "its ways alone, and nothing of others"
         assert [said.what[-1] for said in halts] == ["6", "5"] * 4
-        assert max(later.at - sooner.at for sooner, later in itertools.pairwise(halts)) < 0.3
         taken = shop.tell("take")
         shop.wait_for(stands, taken)
         shop.wait_for(asks_the_state, taken)
@@ -397,8 +391,7 @@ def test_a_child_that_lives_on_does_not_count_as_its_parent(shop: Workshop) -> N
         grandchild = int(child.stdout.readline())
         try:
             killed = kill(child)
-            halt = shop.wait_for(is_halt, killed)
-            assert halt.at - killed < WITHIN
+            shop.wait_for(is_halt, killed)
             shop.wait_for(stands, killed)
         finally:
             os.kill(grandchild, signal.SIGKILL)

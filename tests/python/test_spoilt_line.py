@@ -60,10 +60,9 @@ def test_a_stop_is_sent_to_a_drive_that_seems_deaf(simulator: Simulator, obedien
     assert simulator.drive(1).writes() == written, "the drive was looked at, in vain, and nothing was written"
     with pytest.raises(Unconfirmed):
         obedient.stop(within=0)
-    stops = [value for _, address, value in simulator.drive(1).writes() if address == 0x2000]
-    assert stops == [1, 5]
     simulator.line.clear()
     obedient.wait_until_stopped(timeout=20)
+    assert [value for _, address, value in simulator.drive(1).writes() if address == 0x2000] == [1, 5]
 
 
 def test_a_late_answer_is_never_taken_for_another(simulator: Simulator, bus: Bus, timeout: float) -> None:
