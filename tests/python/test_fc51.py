@@ -85,6 +85,16 @@ def test_who_says_it_is_not_asked(line: Simulator) -> None:
     assert "01 03 0B D5 00 02" not in sent(line, 0x03)
 
 
+def test_100_percent_may_be_any_frequency(line: Simulator) -> None:
+    with Bus(line) as bus:
+        drive = bus.drive(1, "fc51", variants={"base_frequency": "87 Hz"}, unverified=True)
+        drive.setpoint = 30
+        with pytest.raises(NotAllowed, match="1 Hz to 400 Hz"):
+            bus.drive(1, "fc51", variants={"base_frequency": "1500 Hz"}, unverified=True)
+    # 491520 by 87 are 5649.7: 1612H.
+    assert sent(line) == ["01 06 C3 59 16 12"]
+
+
 def test_without_a_word_of_trust_nothing_moves(line: Simulator) -> None:
     with Bus(line) as bus:
         drive = bus.drive(1, "fc51")

@@ -6,6 +6,7 @@ the factory; S-5 counts 16384 for 100 %. Words and values are worked out by hand
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -123,3 +124,27 @@ def test_a_raw_write_is_judged_as_a_command(drive: Drive) -> None:
         drive.write_words(STATUS, 3)
     with pytest.raises(drivebus.NotAllowed):
         drive.write("order", 2)
+
+
+def test_the_whole_may_be_any_value_of_the_parameter(tmp_path: Path) -> None:
+    """The same drive, whose S-4 is the whole, whatever it is."""
+    folder = tmp_path / "any"
+    shutil.copytree(SHARE, folder)
+    file = folder / "profile.toml"
+    text = file.read_text().replace('parameter = "S-3"', 'parameter = "S-4"')
+    before, table, rest = text.partition("[variants.base_frequency.choices]\n")
+    rest = rest[rest.index("\n[") :]
+    assert table
+    file.write_text(f"{before}[variants.base_frequency.share]\ncounts = 16384\nlow = 1.0\nhigh = 100.0\n{rest}")
+    with Simulator({1: folder}, transport="process", clock="virtual") as line, Bus(line) as bus:
+        drive = bus.drive(1, profile=folder)
+        drive.prepare_control(store=True)
+        # 16384 of 47.5 Hz: 10 Hz are 3449.3; of 60 Hz 2730.7.
+        for whole, counts in ((47.5, 3449), (60.0, 2731)):
+            drive.write("S-4", whole, store=True)
+            drive.run(hz=10.0)
+            assert line.drive(1).register(SPEED) == counts
+            line.advance(5.0)
+            assert line.drive(1).frequency == pytest.approx(10.0, abs=0.01)
+            drive.stop()
+            drive.wait_until_stopped(timeout=20)

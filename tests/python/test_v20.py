@@ -72,12 +72,48 @@ def test_the_setpoint_is_a_share_of_p2000(line: Simulator, drive: Drive) -> None
     assert line.drive(1).frequency == pytest.approx(10.0, abs=0.01)
 
 
-def test_another_reference_frequency_is_refused(line: Simulator, drive: Drive) -> None:
-    drive.write("P2000", 55.0, store=True)
+@pytest.mark.parametrize(
+    ("reference", "counts"),
+    # 163840 by 55 are 2978.9, by 87 1883.2, by 47.53 3447.1, by 400 409.6.
+    [(55.0, 2979), (87.0, 1883), (47.53, 3447), (400.0, 410)],
+)
+def test_10_hz_are_a_share_of_what_p2000_says(line: Simulator, drive: Drive, reference: float, counts: int) -> None:
+    drive.write("P2000", reference, store=True)
+    drive.run(10.0)
+    assert (line.drive(1).register(0x0064), line.drive(1).state) == (counts, "forward")
+    line.advance(20.0)
+    assert line.drive(1).frequency == pytest.approx(10.0, abs=reference / 16384)
+
+
+def test_a_reference_that_is_none_is_refused(line: Simulator, drive: Drive) -> None:
+    drive.write("P2000", 590.0, store=True)
     before = len(written(line))
-    with pytest.raises(NotAllowed, match="P2000"):
+    with pytest.raises(NotAllowed, match=r"P2000 of unit 1 is 59000, which means nothing known.*'1 Hz' to '550 Hz'"):
         drive.run(10.0)
+    with pytest.raises(NotAllowed, match="P2000"):
+        drive.setpoint = 10.0
     assert len(written(line)) == before
+    with Bus(line) as bus:
+        for wrong in ("0.5 Hz", "551 Hz", "50.001 Hz", "fast"):
+            with pytest.raises(NotAllowed, match="1 Hz to 550 Hz, in its own steps"):
+                bus.drive(1, "v20", variants={"base_frequency": wrong}, unverified=True)
+        drive = bus.drive(1, "v20", variants={"base_frequency": "87"}, unverified=True)
+        assert drive.profile.variants_chosen == {"base_frequency": "87 Hz"}
+
+
+def test_who_said_what_it_is_a_share_of_does_not_set_it_otherwise(line: Simulator) -> None:
+    with Bus(line) as bus:
+        drive = bus.drive(1, "v20", variants={"base_frequency": "50 Hz"}, unverified=True)
+        drive.write("P2000", 50.0, store=True)
+        with pytest.raises(NotAllowed, match="base_frequency"):
+            drive.write("P2000", 60.0, store=True)
+        assert drive.read("P2000") == 50.0
+
+
+def test_the_command_says_between_what_it_may_be() -> None:
+    told = CliRunner().invoke(cli, ["profiles", "show", "v20"]).output
+    assert "what P2000 says, 1 Hz to 550 Hz" in told
+    assert '--variant base_frequency="550 Hz"' in told
 
 
 def test_the_drive_obeys_no_run_without_047eh(line: Simulator, drive: Drive) -> None:

@@ -83,7 +83,7 @@ fn check_deciding<E>(profile: &Profile, wanted: &[(&str, Input<'_>)]) -> Result<
         let Some(choice) = profile.chosen().get(variant) else { continue };
         let word =
             entry.encode(*value).map_err(|why| Why::NotPlanned(NotPlanned::of(name, WhyNotPlanned::Unfit(why))))?;
-        if rule.choices.get(choice).is_some_and(|chosen| chosen.word != word) {
+        if profile.choice_of(variant, word.into()).as_ref() != Some(choice) {
             let (name, variant, choice) = ((*name).to_owned(), variant.clone(), choice.clone());
             return Err(Why::Unsays { name, variant, choice });
         }

@@ -87,8 +87,7 @@ impl Unit {
         let read = Read::words(self.address(), place, entry.words());
         let words = line.taken_for(self.address(), self.family()).read(read).await.map_err(NotSettled::Failed)?;
         let raw = number(entry, &words);
-        let told = rule.choices.iter().find(|(_, choice)| u32::from(choice.word) == raw);
-        told.map(|(name, _)| name.clone()).ok_or_else(|| NotSettled::Unknown {
+        profile.choice_of(variant, raw).ok_or_else(|| NotSettled::Unknown {
             variant: variant.to_owned(),
             parameter: rule.parameter.clone(),
             raw,

@@ -95,7 +95,7 @@ pub use parts::rules::{Requests, UnitKind};
 pub use parts::serial::SerialDefaults;
 pub use parts::setpoint::{Setpoint, SetpointRole};
 pub use parts::state::{State, StateRule, StateWord};
-pub use parts::variant::{Variant, VariantChoice, VariantError};
+pub use parts::variant::{Share, Variant, VariantChoice, VariantError};
 pub use parts::watchdog::Watchdog;
 pub use place::{Place, Table};
 pub use plan::{ReadCost, ReadSpan, plan_reads};

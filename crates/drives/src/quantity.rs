@@ -213,7 +213,7 @@ impl Quantity {
         self.scale.unwrap_or(Scale::ONE)
     }
 
-    fn value(&self, count: i64) -> Value {
+    pub(crate) fn value(&self, count: i64) -> Value {
         Value::new(count, self.scale_or_one())
     }
 }

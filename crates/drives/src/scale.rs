@@ -9,8 +9,8 @@ use crate::decimal::{Counts, Decimal};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct Scale {
     /// Without a common divisor, as `units`.
-    counts: u16,
-    units: u16,
+    counts: u32,
+    units: u32,
     /// Digits after the point: the fewest at which every count reads differently.
     decimals: u8,
     /// Whether a count is a step of the last digit, as nearly everywhere.
@@ -29,23 +29,32 @@ impl Scale {
     pub(crate) fn parse(text: &str) -> Option<Self> {
         match text.split_once('/') {
             None => Self::decimal(text.trim().parse().ok()?),
-            Some((counts, units)) => Self::ratio(counts.trim().parse().ok()?, units.trim().parse().ok()?),
+            Some((counts, units)) => {
+                let number = |text: &str| text.trim().parse::<u16>().ok().map(u64::from);
+                Self::ratio(number(counts)?, number(units)?)
+            }
         }
+    }
+
+    /// Of what has `counts` where something else, counted as `per` says, has `whole`: 16384 counts where 5000 hundredths of a
+    /// hertz are set. `None` where nothing is, or where a count would be too little or too much for a number of this kind.
+    pub(crate) fn of_share(counts: u16, whole: u32, per: Self) -> Option<Self> {
+        Self::ratio(u64::from(counts) * u64::from(per.counts), u64::from(whole) * u64::from(per.units))
     }
 
     /// The scale of so many counts per unit, if that is a power of ten up to 10000.
     pub(crate) fn decimal(counts: u32) -> Option<Self> {
         let decimals = (0..=MOST_DECIMALS).find(|&decimals| 10_u32.pow(decimals.into()) == counts)?;
-        Some(Self { counts: u16::try_from(counts).ok()?, units: 1, decimals, is_decimal: true })
+        Some(Self { counts, units: 1, decimals, is_decimal: true })
     }
 
-    /// Counts and units are 1 to 65535 each.
-    fn ratio(counts: u16, units: u16) -> Option<Self> {
+    fn ratio(counts: u64, units: u64) -> Option<Self> {
         if counts == 0 || units == 0 {
             return None;
         }
         let divisor = greatest_common_divisor(counts, units);
-        let (counts, units) = (counts / divisor, units / divisor);
+        let [counts, units] = [counts, units].map(|each| u32::try_from(each / divisor).ok());
+        let (counts, units) = (counts?, units?);
         // With one digit less a count would be less than one step of the last digit, and two of 65536 would read the same.
         let steps = |decimals: u8| u64::from(units) * 10_u64.pow(decimals.into());
         let decimals = (0..=5).find(|&decimals| steps(decimals) >= u64::from(counts))?;
@@ -54,7 +63,7 @@ impl Scale {
 
     /// Counts and units, without a common divisor.
     pub(crate) fn as_ratio(self) -> (u32, u32) {
-        (self.counts.into(), self.units.into())
+        (self.counts, self.units)
     }
 
     /// Digits after the point.
@@ -112,7 +121,7 @@ impl Scale {
     }
 }
 
-fn greatest_common_divisor(mut one: u16, mut other: u16) -> u16 {
+fn greatest_common_divisor(mut one: u64, mut other: u64) -> u64 {
     while other != 0 {
         (one, other) = (other, one % other);
     }

@@ -193,6 +193,7 @@ pub(crate) fn variants<'py>(py: Python<'py>, profile: &Profile) -> Table<'py> {
         let dict = PyDict::new(py);
         dict.set_item("parameter", &variant.parameter)?;
         dict.set_item("choices", choices)?;
+        dict.set_item("between", profile.share_between(variant))?;
         dict.set_item("reason", (!variant.verified).then_some(&variant.note))?;
         dict.set_item("source", &variant.source)?;
         all.set_item(name, dict)?;

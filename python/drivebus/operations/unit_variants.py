@@ -47,7 +47,8 @@ async def settled(unit: DriveView, *names: str) -> DriveView:
 
 def given(unit: DriveView, variant: str) -> Text:
     """How *variant* is given, for people."""
-    choices = ", ".join(map(repr, rules(unit)[variant]["choices"]))
+    rule = rules(unit)[variant]
+    choices = ", ".join(map(repr, rule.choices)) if rule.between is None else "{!r} to {!r}".format(*rule.between)
     return Text(Advice("variants", variant, f"variants={{{variant!r}: …}} for bus.drive()"), f" ({choices})")
 
 

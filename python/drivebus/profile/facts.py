@@ -160,13 +160,16 @@ class Variant(_Fact):
 
     Attributes:
         parameter: The parameter.
-        choices: What it may decide, by name, and the word of the parameter for each.
+        choices: What it may decide, by name, and the word of the parameter for each; none where it is a share.
+        between: Where registers count a share of what the parameter says: the least and the most that this may be, as
+            texts that `variants` takes, `("1 Hz", "599 Hz")`. Else None.
         reason: Why those words are not verified; None where they are.
         source: The document that says so.
     """
 
     parameter: str
     choices: Mapping[str, int]
+    between: tuple[str, str] | None
     reason: str | None
     source: str
 

@@ -16,7 +16,7 @@ use crate::parts::fault::{Exception, Means};
 use crate::parts::identification::{Identification, Signature};
 use crate::parts::memory::Memory;
 use crate::parts::serial::SerialDefaults;
-use crate::parts::variant::{Variant, VariantChoice};
+use crate::parts::variant::{Share, Variant, VariantChoice};
 use crate::parts::watchdog::Watchdog;
 use crate::place::Place;
 use crate::profile::Profile;
@@ -260,7 +260,15 @@ pub(super) fn variant(
     if !row.verified && row.note.is_empty() {
         problems.add(file, line(file, spanned), "a variant that is not verified needs a \"note\" that says why");
     }
-    let parameter = entries.get(file, &row.parameter, problems)?.name.clone();
+    let parameter = entries.get(file, &row.parameter, problems)?;
+    if row.share.is_some() != row.choices.is_empty() {
+        problems.add(file, line(file, spanned), "a variant has either \"choices\" or a \"share\"");
+    }
+    let share = row.share.as_ref().and_then(|spanned| {
+        let share = variant_share(spanned.get_ref(), &parameter.quantity);
+        problems.keep(share.map_err(|why| file.broken(line(file, spanned), why)))
+    });
+    let parameter = parameter.name.clone();
     let mut choices: BTreeMap<String, VariantChoice> = BTreeMap::new();
     for (name, spanned) in &row.choices {
         let choice = spanned.get_ref();
@@ -271,7 +279,19 @@ pub(super) fn variant(
         choices.extend(quantity.map(|quantity| (name.clone(), VariantChoice { word: choice.value, quantity })));
     }
     let (verified, note, source) = (row.verified, row.note.clone(), row.source.clone());
-    Some(Variant { parameter, choices, verified, note, source })
+    Some(Variant { parameter, choices, share, verified, note, source })
+}
+
+fn variant_share(row: &manifest::VariantShare, parameter: &Quantity) -> Result<Share, String> {
+    let (_, most) = limits(row.signed, false);
+    if !(1..=most).contains(&i64::from(row.counts)) {
+        return Err(format!("counts = {} must be 1 to {most}", row.counts));
+    }
+    if parameter.scale.is_none() || parameter.unit.is_empty() || parameter.signed {
+        return Err("a share needs a parameter with a unit and a scale, and without a sign".to_owned());
+    }
+    let (low, high) = Share::bounds(parameter, row.low, row.high)?;
+    Ok(Share { counts: row.counts, signed: row.signed, low, high })
 }
 
 fn variant_quantity(row: &manifest::VariantChoice) -> Result<Quantity, String> {

@@ -7,7 +7,7 @@ mod schema;
 use std::collections::BTreeMap;
 
 pub(super) use motion::{
-    Commands, Control, Elsewhere, Scale, SetpointRole, States, Variant, VariantChoice, Watchdog, Word,
+    Commands, Control, Elsewhere, Scale, SetpointRole, States, Variant, VariantChoice, VariantShare, Watchdog, Word,
 };
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};

@@ -255,3 +255,68 @@ proptest! {
         }
     }
 }
+
+const SHARE_TOML: &str = "[variants.base_frequency.share]\ncounts = 16384\nsigned = true\nlow = 1.0\nhigh = 400.0\n";
+
+/// The profile above, whose `speed` counts a share of 3-03, whatever that is.
+fn sharing(name: &str) -> Profile {
+    let toml = TOML.split_once("[variants.base_frequency.choices]").unwrap().0.to_owned() + SHARE_TOML;
+    folder_of(name, &toml, ROWS).load().unwrap()
+}
+
+#[test]
+fn a_share_of_any_value_of_a_parameter() {
+    let profile = sharing("any");
+    // 3-03 counts thousandths of a hertz. 16384 × 10 / 87 = 1883.2; 16384 × 10 / 87.5 = 1872.5, of which 1872 is the smaller.
+    for (raw, choice, hz, word) in [
+        (50_000, "50 Hz", "10", 3_277),
+        (60_000, "60 Hz", "10", 2_731),
+        (87_000, "87 Hz", "10", 1_883),
+        (87_500, "87.5 Hz", "10", 1_872),
+        (400_000, "400 Hz", "400", 16_384),
+        (1_000, "1 Hz", "0.5", 8_192),
+    ] {
+        assert_eq!(profile.choice_of("base_frequency", raw).as_deref(), Some(choice));
+        let chosen = profile.with_variants([("base_frequency", choice)]).unwrap();
+        assert_eq!(chosen.chosen()["base_frequency"], choice);
+        let speed = chosen.find("speed").unwrap();
+        assert_eq!(speed.encode(Input::Decimal(hz)), Ok(word), "{hz} of {choice}");
+        assert_eq!((speed.quantity().unit(), speed.quantity().high().unwrap().to_f64()), ("Hz", f64::from(raw) / 1e3));
+    }
+    for raw in [0, 999, 400_001, u32::MAX] {
+        assert_eq!(profile.choice_of("base_frequency", raw), None, "{raw}");
+    }
+    for same in ["87Hz", " 87.000 hz ", "87", "8.7e1"] {
+        assert_eq!(profile.with_variants([("base_frequency", same)]).unwrap().chosen()["base_frequency"], "87 Hz");
+    }
+    for wrong in ["", "Hz", "rpm", "0.5 Hz", "401", "87.0001 Hz", "-50 Hz", "nan", "50 Hz Hz"] {
+        let why = profile.with_variants([("base_frequency", wrong)]).unwrap_err().to_string();
+        assert!(why.contains("ex5") && why.contains("1 Hz to 400 Hz"), "{wrong}: {why}");
+    }
+    assert_eq!(
+        profile.share_between(&profile.variants()["base_frequency"]),
+        Some(("1 Hz".to_owned(), "400 Hz".to_owned()))
+    );
+}
+
+proptest! {
+    /// Held to fractions: a word is at most half a count away from what was asked, and the whole is the whole.
+    #[test]
+    fn a_share_is_as_much_of_the_whole(raw in 1_000_u32..=400_000, part in 0_u32..=1_000) {
+        let profile = sharing("parts");
+        let choice = profile.choice_of("base_frequency", raw).unwrap();
+        let chosen = profile.with_variants([("base_frequency", choice.as_str())]).unwrap();
+        let speed = chosen.find("speed").unwrap();
+        let whole = (speed.decode(16_384).to_f64() * 1e3 - f64::from(raw)).abs();
+        prop_assert!(whole * 2.0 <= 10_f64.powi(3 - i32::from(speed.quantity().decimals())) + 1e-6, "{}", whole);
+        // In thousandths of a hertz, rounded down: no more digits than the register reads with.
+        let asked = u64::from(raw) * u64::from(part) / 1_000;
+        let decimals = u32::from(speed.quantity().decimals());
+        let step = 10_u64.pow(3_u32.saturating_sub(decimals));
+        let asked = asked / step * step;
+        let text = format!("{}.{:03}", asked / 1_000, asked % 1_000);
+        let word = u64::from(speed.encode(Input::Decimal(&text)).unwrap());
+        let off = (word * u64::from(raw)).abs_diff(asked * 16_384);
+        prop_assert!(off * 2 <= u64::from(raw), "{} of {}: {}", text, choice, word);
+    }
+}

@@ -221,8 +221,13 @@ def _setpoints(profile: drivebus.Profile) -> list[str]:
 def _variants(profile: drivebus.Profile) -> Iterator[str]:
     for name, variant in profile.variants().items():
         reason = "" if variant.reason is None else f" [{variant.reason}]"
-        yield f"{name}: {variant.parameter} is one of {', '.join(variant.choices)}{reason}"
-        yield f"  to say which: --variant {name}={next(iter(variant.choices))}"
+        if variant.between is None:
+            yield f"{name}: {variant.parameter} is one of {', '.join(variant.choices)}{reason}"
+            yield f"  to say which: --variant {name}={next(iter(variant.choices))}"
+        else:
+            low, high = variant.between
+            yield f"{name}: what {variant.parameter} says, {low} to {high}{reason}"
+            yield f'  to say it: --variant {name}="{high}"'
 
 
 def _watchdog(profile: drivebus.Profile) -> list[str]:

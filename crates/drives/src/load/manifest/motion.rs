@@ -201,8 +201,11 @@ pub(in crate::load) struct SetpointRole {
 pub(in crate::load) struct Variant {
     /// The parameter that decides.
     pub(in crate::load) parameter: Placed<String>,
-    /// By name, such as `Hz`.
+    /// By name, such as `Hz`; or `share`.
+    #[serde(default)]
     pub(in crate::load) choices: BTreeMap<String, Placed<VariantChoice>>,
+    /// Of what the parameter says, whatever that is; or `choices`.
+    pub(in crate::load) share: Option<Placed<VariantShare>>,
     /// Whether a document of this very family prints it.
     pub(in crate::load) verified: bool,
     /// What to know about it; where it is not verified, why.
@@ -210,6 +213,22 @@ pub(in crate::load) struct Variant {
     pub(in crate::load) note: String,
     /// Where it is printed: document and page.
     pub(in crate::load) source: String,
+}
+
+/// A share of what the parameter says, in its unit.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct VariantShare {
+    /// The counts of the register that are as much as the parameter says.
+    pub(in crate::load) counts: u16,
+    /// Whether the word is two's complement.
+    #[serde(default)]
+    pub(in crate::load) signed: bool,
+    /// The least that the parameter may say, above 0: with less the drive is refused.
+    pub(in crate::load) low: f64,
+    /// The most that it may say.
+    pub(in crate::load) high: f64,
 }
 
 /// What a register means with this choice.

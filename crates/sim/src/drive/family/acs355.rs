@@ -11,8 +11,8 @@
 //! - Assumption: it refuses what is not here with 02H, and what is out of range with 03H. A silent bus is not watched.
 
 use super::{
-    Family, Faults, Handshake, Kind, MAX_WORDS, Measure, Memory, Parameter, Range, Register, Roles, Shows, Speed,
-    SpeedScale, USUAL_DELAY, USUAL_MAX_HZ,
+    Deciding, Family, Faults, Handshake, Kind, MAX_WORDS, Measure, Memory, Parameter, Range, Register, Roles, Shows,
+    Speed, SpeedScale, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::by_the_specification;
@@ -43,7 +43,11 @@ pub(crate) fn acs355() -> Family {
         roles: Roles {
             obeys: vec![(COMMAND_SOURCE, 10)],
             speed_source: Some(vec![(COMMAND_SOURCE, 10), (SETPOINT_SOURCE, 8)]),
-            speed: Some(Speed { register: 1, unit: Some((REFERENCE, vec![(600, hertz(60.0))])), usual: hertz(50.0) }),
+            speed: Some(Speed {
+                register: 1,
+                unit: Some(Deciding::Words(REFERENCE, vec![(600, hertz(60.0))])),
+                usual: hertz(50.0),
+            }),
             handshake: Some(Handshake { idle: 0x0270, words: vec![(0x0476, 0x0231)] }),
             ..Roles::NONE
         },

@@ -18,8 +18,8 @@ use drivebus_drives::{
 };
 
 use super::{
-    Bit, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, Parameter, Range, Register, Roles, Scaled,
-    Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ, register,
+    Bit, Bounds, Deciding, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, Parameter, Range,
+    Register, Roles, Scaled, Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ, register,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::map::{Access, bounds, low_word};
@@ -191,15 +191,28 @@ impl Own<'_> {
             let choices = variant.choices.values();
             choices.filter_map(|choice| Some((choice.word, self.scale(&choice.quantity)?))).collect()
         });
+        // Of two words the low one tells.
+        let decider = variant.and_then(|variant| self.profile.find(&variant.parameter).ok());
+        let parameter = decider.and_then(low_word);
+        let share = variant.and_then(|variant| variant.share.as_ref()).zip(decider).map(|(share, decider)| {
+            let (counts, bounds) = (f64::from(share.counts), Bounds { signed: share.signed, ..Bounds::NONE });
+            let factory = decider.default_raw().map_or(USUAL_MAX_HZ, |raw| decider.decode(raw).to_f64());
+            (counts, SpeedScale { bounds, ..SpeedScale::share(counts, factory) })
+        });
         let usual = self.scale(entry.quantity()).or_else(|| choices.first().map(|&(_, scale)| scale));
+        let usual = usual.or(share.map(|(_, usual)| usual));
         let Some(usual) = usual else {
             let what = format!("{} (registers.csv) is not in Hz, % or rpm, with a scale that is known", entry.name());
             self.miss(PLACE, &what);
             return None;
         };
-        // Of two words the low one tells: a choice has one word.
-        let parameter = variant.and_then(|variant| self.profile.find(&variant.parameter).ok()).and_then(low_word);
-        Some(Speed { register, unit: parameter.map(|parameter| (parameter, choices)), usual })
+        let unit = parameter.map(|address| match share.zip(decider) {
+            Some(((whole, _), decider)) => {
+                Deciding::Share(Scaled { address, counts: counts(decider.quantity()) }, whole)
+            }
+            None => Deciding::Words(address, choices),
+        });
+        Some(Speed { register, unit, usual })
     }
 
     /// How `quantity` counts a speed, if it does.

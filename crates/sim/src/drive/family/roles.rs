@@ -65,10 +65,19 @@ impl Scaled {
 #[derive(Debug, Clone)]
 pub(crate) struct Speed {
     pub(crate) register: u32,
-    /// A parameter that decides what the register counts, and what its words decide.
-    pub(crate) unit: Option<(u16, Vec<(u16, SpeedScale)>)>,
+    /// The parameter that decides what the register counts.
+    pub(crate) unit: Option<Deciding>,
     /// What it counts otherwise.
     pub(crate) usual: SpeedScale,
+}
+
+/// How a parameter decides what a speed is counted in.
+#[derive(Debug, Clone)]
+pub(crate) enum Deciding {
+    /// By its words, and what each of them decides.
+    Words(u16, Vec<(u16, SpeedScale)>),
+    /// So many counts are as many hertz as it says, whatever that is.
+    Share(Scaled, f64),
 }
 
 /// What a speed is counted in.
@@ -108,12 +117,18 @@ impl Speed {
     }
 
     /// The scale in force, where `value_of` tells the values of parameters.
-    pub(crate) fn scale(&self, value_of: impl Fn(u16) -> Option<u16>) -> &SpeedScale {
-        let decided = self.unit.as_ref().and_then(|(parameter, choices)| {
-            let word = value_of(*parameter)?;
-            choices.iter().find(|&&(choice, _)| choice == word).map(|(_, scale)| scale)
+    pub(crate) fn scale(&self, value_of: impl Fn(u16) -> Option<u16>) -> SpeedScale {
+        let decided = self.unit.as_ref().and_then(|deciding| match deciding {
+            Deciding::Words(parameter, choices) => {
+                let word = value_of(*parameter)?;
+                choices.iter().find(|&&(choice, _)| choice == word).map(|&(_, scale)| scale)
+            }
+            Deciding::Share(parameter, counts) => {
+                let hertz = f64::from(value_of(parameter.address)?) / parameter.counts;
+                (hertz > 0.0).then(|| SpeedScale { bounds: self.usual.bounds, ..SpeedScale::share(*counts, hertz) })
+            }
         });
-        decided.unwrap_or(&self.usual)
+        decided.unwrap_or(self.usual)
     }
 }
 

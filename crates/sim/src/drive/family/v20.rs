@@ -7,13 +7,14 @@
 //! - Assumption: a run is obeyed only behind 047EH (OFF1), which 047CH (OFF2), 04FEH (a reset) and the power take back.
 //! - Assumption: other words are out of range, and so are those at 0003H to 0006H, which set single bits of the control word: they are
 //!   taken and do nothing here.
-//! - Assumption: it obeys the bus always (P0700 and P1000 are 5), and 50.00 Hz are both its reference and its highest frequency.
+//! - Assumption: it obeys the bus always (P0700 and P1000 are 5). 50.00 Hz are its reference, until P2000 says another one, and its highest
+//!   frequency.
 //! - Assumption: an overload is fault 11; no register at hand shows its number.
 //! - Assumption: it refuses what is not here with 02H, and what is out of range with 03H. A silent bus is not watched.
 
 use super::{
-    Family, Faults, Handshake, Kind, Measure, Memory, Parameter, Range, Register, Roles, Scaled, Shows, Speed,
-    SpeedScale, USUAL_DELAY, USUAL_MAX_HZ,
+    Deciding, Family, Faults, Handshake, Kind, Measure, Memory, Parameter, Range, Register, Roles, Scaled, Shows,
+    Speed, SpeedScale, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::by_the_specification;
@@ -44,8 +45,8 @@ pub(crate) fn v20() -> Family {
         roles: Roles {
             speed: Some(Speed {
                 register: 0x0064,
-                unit: Some((REFERENCE, vec![(6_000, hertz(60.0))])),
-                usual: hertz(50.0),
+                unit: Some(Deciding::Share(Scaled::hundredths(REFERENCE), COUNTS)),
+                usual: SpeedScale::share(COUNTS, 50.0),
             }),
             acceleration: Some(Scaled::hundredths(ACCELERATION)),
             deceleration: Some(Scaled::hundredths(DECELERATION)),
@@ -58,10 +59,8 @@ pub(crate) fn v20() -> Family {
     }
 }
 
-/// 4000H counts are the reference frequency; below zero it turns the other way.
-const fn hertz(reference: f64) -> SpeedScale {
-    SpeedScale::share(16_384.0, reference)
-}
+/// 4000H are the reference frequency; below zero it turns the other way.
+const COUNTS: f64 = 16_384.0;
 
 const COMMANDS: &[(u16, Command)] = &[
     (0x047C, Command::Coast),

@@ -18,8 +18,8 @@
 //! - Assumption: as a master (P30.09 = 1) it stays a slave here.
 
 use super::{
-    Bit, Bounds, Count, Family, Faults, Kind, MAX_WORDS, MEMORY_BIT, Measure, Memory, Parameter, Range, Register,
-    Roles, Scaled, Shows, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
+    Bit, Bounds, Count, Deciding, Family, Faults, Kind, MAX_WORDS, MEMORY_BIT, Measure, Memory, Parameter, Range,
+    Register, Roles, Scaled, Shows, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::Refusal;
@@ -73,7 +73,7 @@ fn speed() -> Speed {
     let percent = Bounds { signed: true, ..Bounds::new(-10_000, 10_000) };
     Speed {
         register: 0x7001,
-        unit: Some((
+        unit: Some(Deciding::Words(
             SPEED_UNIT,
             vec![(0, scale(SpeedUnit::Percent, 100.0, percent)), (2, scale(SpeedUnit::Rpm, 1.0, Bounds::NONE))],
         )),
