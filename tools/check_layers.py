@@ -381,8 +381,12 @@ def own_names(nodes: tuple[ast.AST, ...]) -> set[str]:
 
 
 def is_private(name: str) -> bool:
-    """Whether *name* has an underscore for what is nobody else's."""
-    return name.startswith("_") and not name.startswith("__") and name != "_"
+    """Whether *name* has an underscore for what is nobody else's; those of a named tuple have it for another reason."""
+    return (
+        name.startswith("_")
+        and not name.startswith("__")
+        and name not in {"_", "_replace", "_asdict", "_fields", "_make"}
+    )
 
 
 @functools.cache

@@ -84,7 +84,8 @@ class TestShow:
         assert known["chf100a"]["aliases"] == ["Huanyang GT", "Fuling DZB200"]
 
     @pytest.mark.parametrize(
-        ("called", "family"), [("VFD-MS300", "ms300"), ("altivar 312", "atv312"), ("huanyang GT", "chf100a")]
+        ("called", "family"),
+        [("VFD-MS300", "ms300"), ("altivar 312", "atv312"), ("huanyang GT", "chf100a"), ("omron mx2", "wj200")],
     )
     def test_what_stands_on_a_drive_is_a_name_too(self, called: str, family: str) -> None:
         [known] = rows("profiles", "show", called)
