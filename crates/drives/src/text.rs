@@ -1,5 +1,7 @@
 //! Text as people write it: parameter codes, addresses, and the closest match for a misspelt name.
 
+use crate::place::{Place, Table};
+
 /// Reads a parameter's code, `P05.06`, `p5.6` or, as some makers write what can only be read, `r25.00`, as group and
 /// index.
 pub(crate) fn parse_code(text: &str) -> Option<(u8, u8)> {
@@ -21,6 +23,15 @@ pub(crate) fn parse_loose_code(text: &str) -> Option<(u8, u8)> {
         None => return None,
     };
     parse_code(&format!("P{group}.{index}"))
+}
+
+/// Reads an address with the name of its table before it, `input 0x0000`; without one it is that of a holding register.
+pub(crate) fn parse_place(text: &str) -> Option<Place> {
+    let (table, address) = match text.split_once(' ') {
+        Some((name, address)) => (Table::named(name)?, address),
+        None => (Table::Holding, text),
+    };
+    parse_address(address).map(|address| Place::new(table, address))
 }
 
 /// Reads an address as people type it, also without a sign that it is one: `2103`, `0x 2103`. Only to look
@@ -117,7 +128,23 @@ fn distance(from: &[char], to: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::{closest, distance, near, parse_address, parse_code, parse_loose_address, parse_loose_code};
+    use super::{
+        closest, distance, near, parse_address, parse_code, parse_loose_address, parse_loose_code, parse_place,
+    };
+    use crate::place::{Place, Table};
+
+    #[test]
+    fn a_place_has_the_name_of_its_table_before_it() {
+        assert_eq!(parse_place("0x2103"), Some(Place::from(0x2103)));
+        for (text, table) in
+            [("input 0x000A", Table::Input), ("coil 000AH", Table::Coil), ("holding 0x000A", Table::Holding)]
+        {
+            assert_eq!(parse_place(text), Some(Place::new(table, 0x000A)), "{text}");
+        }
+        for text in ["inputs 0x000A", "input  0x000A", "input 10", "input", "", "0x000A input"] {
+            assert_eq!(parse_place(text), None, "{text:?}");
+        }
+    }
 
     #[test]
     fn distances_are_levenshteins() {

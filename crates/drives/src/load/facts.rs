@@ -22,7 +22,7 @@ use crate::place::Place;
 use crate::profile::Profile;
 use crate::quantity::{Quantity, limits};
 use crate::scale::Scale;
-use crate::text::parse_address;
+use crate::text::parse_place;
 
 /// By the specification the code by which a unit says that it took a request. Families that list it mean something else.
 const ACKNOWLEDGE: u8 = 0x05;
@@ -139,8 +139,8 @@ pub(super) fn signature(
     problems: &mut Problems,
 ) -> Option<Signature> {
     let mut places = |names: &[Placed<String>]| -> Vec<Place> {
-        let place = |name: &Placed<String>| match parse_address(name.get_ref()) {
-            Some(address) => Some(address.into()),
+        let place = |name: &Placed<String>| match parse_place(name.get_ref()) {
+            Some(place) => Some(place),
             None => entries.get(file, name, problems)?.place,
         };
         names.iter().filter_map(place).collect()

@@ -252,7 +252,8 @@ pub(super) struct IdentificationCode {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Signature {
-    /// Names or addresses that it answers, read one word each.
+    /// Names or addresses that it answers, read one word each. An address of another table has the table's name before
+    /// it: `input 0x0000`.
     pub(super) answers: Vec<Placed<String>>,
     /// Names or addresses that it refuses.
     #[serde(default)]
