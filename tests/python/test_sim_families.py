@@ -39,6 +39,7 @@ FAMILIES = {
     23: "acs355",
     24: "fc51",
     25: "wj200",
+    26: "h100",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -239,11 +240,13 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "v20",
             "acs355",
             "fc51",
+            "h100",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:
             assert bus.transact(UNIT[family], pdu(0x08, 0, 0x12AB)) == pdu(0x08, 0, 0x12AB)
-        assert refusal(bus, family, pdu(0x04, 0x2100, 1)) == unknown, family
+        # An H100 has 04H, and nothing there.
+        assert refusal(bus, family, pdu(0x04, 0x2100, 1)) == (0x02 if family == "h100" else unknown), family
     write_many = bytes.fromhex("10 2000 0001 02 0005")
     for family in ("gd3000", "gd3000-rectifier", "chf100a", "chv100"):
         assert refusal(bus, family, write_many) == 0x01, family

@@ -51,10 +51,11 @@ SILENT_ON_CODES = [
     "v20",
     "acs355",
     "wj200",
+    "h100",
 ]
 """The families whose units refuse 2103H."""
 
-SIGNED = ["vfd500", "a1000", "eds300", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "wj200"]
+SIGNED = ["vfd500", "a1000", "eds300", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "wj200", "h100"]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
 NO_SIGNATURE = [family for family in SILENT_ON_CODES if family not in SIGNED]
@@ -77,6 +78,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "vfd500": ["vfd500"],
     # This one has coils, which no other has.
     "wj200": ["wj200"],
+    # And this one answers 04H, which no other does.
+    "h100": ["h100"],
     # And this one 2104H and 2106H.
     "ms300": ["ms300"],
     # And this one 004BH and 0034H, this one 2180H, and this one D000H.

@@ -194,6 +194,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("atv312", 33),
         ("chf100a", 27),
         ("wj200", 20),
+        ("h100", 173),
         ("chv100", 24),
         ("eds300", 17),
         ("fc51", 23),

@@ -20,6 +20,7 @@ mod gd300;
 mod gd3000;
 mod gd350;
 mod gd600;
+mod h100;
 mod handshake;
 mod ms300;
 pub(crate) mod own;
@@ -135,7 +136,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 25] = [
+const FAMILIES: [fn() -> Family; 26] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -161,6 +162,7 @@ const FAMILIES: [fn() -> Family; 25] = [
     acs355::acs355,
     fc51::fc51,
     wj200::wj200,
+    h100::h100,
 ];
 
 impl Family {
