@@ -12,12 +12,12 @@ import drivebus
 from drivebus import Bus, Profile, Simulator
 
 QUESTIONS = {
-    **dict.fromkeys(("vfd500", "wj200"), (0, 4)),
+    **dict.fromkeys(("vfd500", "wj200", "h100"), (0, 4)),
     **dict.fromkeys(("gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a"), (4, 75)),
     **dict.fromkeys(("gd600", "gd3000"), (4, 75)),
-    **dict.fromkeys(("ms300", "eds300", "sunfar-e300", "fc51", "a1000"), (5, 90)),
+    **dict.fromkeys(("ms300", "eds300", "sunfar-e300", "fc51"), (5, 90)),
     **dict.fromkeys(("chf100a", "saj8000m"), (6, 103)),
-    "atv312": (6, 105),
+    **dict.fromkeys(("atv312", "a1000"), (6, 105)),
     "v20": (8, 140),
     "acs355": (9, 155),
 }

@@ -30,13 +30,15 @@ def candidates(given: Settings, full: bool) -> Iterator[Settings]:
 
 
 def factory() -> list[Settings]:
-    """The settings that drives leave their factories with, by their profiles; those of most families first."""
-    each = [
-        Settings(known.baud_rate, int(known.format[0]), known.format[1], int(known.format[2]))
-        for known in (Profile.builtin(name).serial() for name in profiles())
-        if known is not None
-    ]
-    return sorted(dict.fromkeys(each), key=each.count, reverse=True)
+    """The settings that drives leave their factories with, by their profiles; those of most families first.
+
+    Each costs a question to every address. Those that one family has, and no page of it, are tried with all the others.
+    """
+    known = [serial for serial in (Profile.builtin(name).serial() for name in profiles()) if serial is not None]
+    each = [Settings(row.baud_rate, int(row.format[0]), row.format[1], int(row.format[2])) for row in known]
+    printed = {settings for settings, row in zip(each, known, strict=True) if row.verified}
+    likely = [settings for settings in dict.fromkeys(each) if settings in printed or each.count(settings) > 1]
+    return sorted(likely, key=each.count, reverse=True)
 
 
 def longest_delay() -> float:
