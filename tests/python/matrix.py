@@ -67,9 +67,9 @@ RECTIFIERS = ("gd600-rectifier", "gd3000-rectifier")
 """They have no motor and no commands; the simulated ones take INVT's words."""
 INVT_STOP = (0x2000, 5)
 
-_STEP = 23
-"""From one case of the sample to the next: prime to how many there are of all that a case is made of, so that it meets
-each kind."""
+_STEP = 25
+"""From one case of the sample to the next: one by which the sample meets each pair of families and each kind of case,
+which a test says."""
 
 
 class Case(NamedTuple):
