@@ -64,7 +64,7 @@ def test_a_whole_job(simulator: Simulator, drive: Drive) -> None:
 
 
 def test_the_frames_are_those_that_others_send(simulator: Simulator, drive: Drive) -> None:
-    """H100Spindle.md: 05 0049, 05 004B, 06 0201 07D0, each to unit 1. Its CRC of a coil, 0C 2C, is wrong, and not sent."""
+    """H100Spindle.md: 05 0049, 05 004B, 06 0201 07D0. The CRC that it has for a coil, 0C 2C, is a wrong one."""
     drive.run(hz=200.0)
     drive.stop()
     sent = [frame.hex(" ") for _, side, frame in simulator.line.trace() if side == "master"]
@@ -73,7 +73,7 @@ def test_the_frames_are_those_that_others_send(simulator: Simulator, drive: Driv
 
 
 def test_f169_says_what_the_setpoint_counts(simulator: Simulator, drive: Drive) -> None:
-    """Section 6.10 of the D100's manual: with 1, 0201H has two decimals. Ten times the speed is what it would be else."""
+    """Section 6.10 of the D100's manual: with 1, 0201H has two decimals."""
     drive.write("F169", 1, store=True)
     drive.run(hz=200.0)
     drive.wait_for_speed(timeout=20.0)

@@ -31,7 +31,9 @@ VARIANTS = {
 READ_ONLY = {
     "vfd500": 0x04,
     "eds300": 0x05,
-    **dict.fromkeys(["ms300", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "wj200", "h100"], 0x02),
+    **dict.fromkeys(
+        ["ms300", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "wj200", "h100"], 0x02
+    ),
 }
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
 OUT_OF_RANGE = dict.fromkeys(["ms300", "a1000", "saj8000m", "sunfar-e300", "v20", "wj200", "h100"], 0x03)
