@@ -143,12 +143,33 @@ impl Family {
         let place = answer.place;
         match answer.said {
             // It has nothing there, as is right, and says so in the words of another family.
-            Said::Refused(code) if !self.has(place) => !self.lacks_address(code),
+            Said::Refused(code) if !self.has(place) => !self.lacks_place(place, code),
             Said::Refused(_) => !self.refuses(place),
             Said::Word(_) if self.refuses(place) => true,
             // A word that no list has for it: another maker keeps his speed there.
             Said::Word(word) if self.codes().places().contains(&place) => !self.is_own(place, word),
             Said::Word(word) => self.state_place() == Some(place) && !self.knows_state(word),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scripted::shipped;
+
+    /// A V20 knows 03H, 06H and 10H, and says 01H to all others: its manual, p. 111. An H100 answers 04H.
+    #[test]
+    fn that_a_unit_has_no_such_table_is_said_in_two_ways() {
+        let (v20, h100) = (shipped("v20"), shipped("h100"));
+        let input = Place::new(Table::Input, 0);
+        for code in [0x01, 0x02] {
+            let refusal = Answer::refusal_of(input, code);
+            assert!(!v20.is_suspicious(&[refusal]), "{code}");
+            assert!(h100.contradiction(&[refusal]).is_some(), "{code}");
+        }
+        assert!(v20.is_suspicious(&[Answer::refusal_of(input, 0x04)]));
+        assert!(v20.is_suspicious(&[Answer::word_at(input, 0)]));
+        assert!(v20.contradiction(&[Answer::word_at(input, 0)]).is_none());
     }
 }

@@ -137,6 +137,13 @@ impl Family {
         is_no_such_address(&self.profile, code)
     }
 
+    /// Whether its units say by the exception `code` that there is nothing at `place`: no such address, or no function that
+    /// reads its table.
+    pub(crate) fn lacks_place(&self, place: Place, code: ExceptionCode) -> bool {
+        let has_no_table = place.table != Table::Holding && code == ExceptionCode::ILLEGAL_FUNCTION;
+        has_no_table || self.lacks_address(code)
+    }
+
     /// Whether `answer` is a refusal that passes, and so tells nothing of one of its units.
     pub fn is_put_off_by(&self, answer: Answer) -> bool {
         let means_later = |code| self.meanings.of(code) == Meaning::AskAgain;

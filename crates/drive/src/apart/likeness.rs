@@ -1,7 +1,6 @@
 //! What an answer, or the answers so far, say of one family; and what a question would say of two.
 
-use drivebus_drives::{Place, Table};
-use drivebus_rtu::ExceptionCode;
+use drivebus_drives::Place;
 
 use super::Apart;
 use crate::answer::{Answer, Said};
@@ -91,8 +90,7 @@ fn says(family: &Family, answer: Answer) -> Says {
         Said::Refused(code) => {
             // In the words of another maker.
             let is_foreign = family.never_says(code) && !SPECIFIED.contains(&code.0);
-            let has_no_table = place.table != Table::Holding && code == ExceptionCode::ILLEGAL_FUNCTION;
-            let lacks = family.answers(place) && (has_no_table || family.lacks_address(code));
+            let lacks = family.answers(place) && family.lacks_place(place, code);
             return if is_foreign || lacks { Says::Against } else { Says::Nothing };
         }
     };
