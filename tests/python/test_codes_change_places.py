@@ -78,4 +78,7 @@ def test_what_asks_of_a_unit_that_nobody_knows_stays_small() -> None:
             *("c417", "1003"),
         ]
         assert len(asked) == 13
+        # And input register 0000H, once for all: an H100 answers it, an A1000 and a V20 refuse it.
+        inputs = [data[2:4].hex() for _, who, data in line.line.trace() if who == "master" and data[1] == 0x04]
+        assert inputs == ["0000"]
         assert written(line) == []
