@@ -15,8 +15,8 @@
 use drivebus_rtu::Table;
 
 use super::{
-    Bit, Bounds, Family, Faults, Kind, Measure, Memory, Parameter, Range, Register, Roles, Scaled, Shows, Speed,
-    SpeedScale, SpeedUnit, USUAL_DELAY,
+    Bit, Bounds, Deciding, Family, Faults, Kind, Measure, Memory, Parameter, Range, Register, Roles, Scaled, Shows,
+    Speed, SpeedScale, SpeedUnit, USUAL_DELAY,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::places::spot;
@@ -58,7 +58,7 @@ pub(crate) fn h100() -> Family {
             speed_source: Some(vec![(FREQUENCY_SOURCE, 2)]),
             speed: Some(Speed {
                 register: 0x0201,
-                unit: Some((DECIMALS, vec![(1, hertz(100.0))])),
+                unit: Some(Deciding::Words(DECIMALS, vec![(1, hertz(100.0))])),
                 usual: hertz(10.0),
             }),
             keypad_frequency: Some(Scaled::tenths(0x0003)),
