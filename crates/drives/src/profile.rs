@@ -457,8 +457,9 @@ impl Profile {
             }
             let Place { table, address } = self.read_address(entry)?;
             let span = ReadSpan { table, address, count: entry.words() };
+            let is_single = self.requests.single_parameters && entry.kind() == Kind::Parameter;
             // Whether there is such a parameter is not known, and a drive refuses a read as a whole.
-            if entry.is_listed() { &mut wanted } else { &mut alone }.push(span);
+            if entry.is_listed() && !is_single { &mut wanted } else { &mut alone }.push(span);
         }
         // The second word of a wide entry is nobody's own.
         let covers = |place: Place| {

@@ -114,7 +114,8 @@ class _Search:
 
     async def group(self, group: int) -> Group:
         """What is there of one *group*."""
-        walk = Walk(self._unit.profile.max_words)
+        profile = self._unit.profile
+        walk = Walk(1 if profile.requests().single_parameters else profile.max_words)
         while (asked := walk.ask()) is not None:
             first, count = asked
             answer = await self._read(group, first, count)

@@ -148,6 +148,9 @@ pub(super) struct Requests {
     /// Whether a read may run from one parameter group into the next.
     #[serde(default = "yes")]
     pub(super) across_groups: bool,
+    /// Whether a read may have one parameter and no more.
+    #[serde(default)]
+    pub(super) single_parameters: bool,
     /// Whether a document of this very family prints it.
     #[serde(default = "yes")]
     pub(super) verified: bool,

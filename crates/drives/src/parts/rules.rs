@@ -34,6 +34,8 @@ pub struct Requests {
     pub joined: Option<String>,
     /// Whether a read may run from one parameter group into the next.
     pub across_groups: bool,
+    /// Whether a read may have one parameter and no more; registers are not meant.
+    pub single_parameters: bool,
     /// Whether documents of this family print all of this.
     pub verified: bool,
     /// What to know about it; says what is assumed where it is not verified.

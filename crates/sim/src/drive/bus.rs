@@ -108,6 +108,7 @@ impl Drive {
                 self.check_count(count)?;
                 self.check_unlocked()?;
                 self.check_groups(address, count)?;
+                self.check_single(address, count)?;
                 let words = words.get_mut(..usize::from(count)).ok_or(Refusal::Structure)?;
                 for (word, offset) in words.iter_mut().zip(0..) {
                     *word = self.word(spot(table, address.wrapping_add(offset)))?;
@@ -142,6 +143,16 @@ impl Drive {
         let group = |address: u16| address >> 8;
         let last = address.wrapping_add(count - 1);
         if self.family().across_groups || group(address) == group(last) { Ok(()) } else { Err(Refusal::Address) }
+    }
+
+    /// Whether a read of several words has no parameter where one may stand alone only.
+    fn check_single(&self, address: u16, count: u16) -> Result<(), Refusal> {
+        let is_parameter = |offset| {
+            let word = self.map.word(spot(Table::Holding, address.wrapping_add(offset)));
+            word.is_some_and(Word::is_parameter)
+        };
+        let is_free = count == 1 || !self.family().roles.reads_single_parameters;
+        if is_free || !(0..count).any(is_parameter) { Ok(()) } else { Err(Refusal::Structure) }
     }
 
     fn write(&mut self, now: Instant, address: u32, words: Words<'_>) -> Result<(), Refusal> {

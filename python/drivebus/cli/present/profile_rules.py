@@ -94,6 +94,8 @@ def _line(profile: drivebus.Profile) -> list[str]:
         lines.append("one request may write several parameters")
     if not requests.across_groups:
         lines.append("no read leaves its group of parameters")
+    if requests.single_parameters:
+        lines.append("a read has one parameter and no more")
     serial = profile.serial()
     if serial is None:
         return [*lines, "its factory setting is not known"]

@@ -61,6 +61,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         speed,
         max_frequency,
         handshake,
+        reads_single_parameters: profile.requests().single_parameters,
         ..own.roles()
     };
     let delay = profile.serial().map(|serial| u16::try_from(serial.response_delay.as_millis()).unwrap_or(u16::MAX));

@@ -39,6 +39,8 @@ pub(crate) struct Roles {
     pub(crate) on_silence: Option<Silence>,
     /// The words that the command register must get before a run. `None`: a run is obeyed at once.
     pub(crate) handshake: Option<Handshake>,
+    /// Whether a read may have one parameter and no more.
+    pub(crate) reads_single_parameters: bool,
 }
 
 /// A parameter that holds a quantity.
@@ -179,5 +181,6 @@ impl Roles {
         bus_timeout: None,
         on_silence: None,
         handshake: None,
+        reads_single_parameters: false,
     };
 }
