@@ -56,6 +56,32 @@ MAKERS = [
         shown="oL",
     ),
     Maker(
+        "vfd-e",
+        prepare=("06 02 01 00 03", "06 02 00 00 03"),
+        forward=("10 20 00 00 02 04 00 12 07 d0",),
+        reverse="06 20 00 00 22",
+        stop="06 20 00 00 01",
+        reset="06 20 02 00 02",
+        fault=7,
+        # No list of its faults is at hand.
+        shown="",
+    ),
+    Maker(
+        "yl620",
+        # 20.0 Hz are 200 counts.
+        prepare=("06 00 01 00 03", "06 07 08 00 05"),
+        forward=("06 20 01 00 c8", "06 20 00 00 12"),
+        reverse="06 20 00 00 22",
+        stop="06 20 00 00 01",
+        reset="06 20 00 00 80",
+        fault=4,
+        shown="Er.02",
+        # What makes it obey the bus is copied from programs, and the range of its setpoint is not printed.
+        unverified=True,
+        sure=True,
+        forward_alone="06 20 00 00 12",
+    ),
+    Maker(
         "a1000",
         variants={"speed_unit": "Hz"},
         forward=("10 00 01 00 02 04 00 01 07 d0",),
@@ -263,8 +289,8 @@ class TestDelta:
         assert (found.family, found.certainty) == ("ms300", "by answers")
         asked = [data[2:4].hex() for _, who, data in line.line.trace() if who == "master" and data[1] == 0x03]
         assert list(dict.fromkeys(asked)) == [
-            *("2103", "1900", "2104", "2106", "3000"),
-            *("004b", "2180", "d000", "0c81", "006d", "0003", "c417", "1003"),
+            *("2103", "1900", "2104", "2106", "200b", "3000"),
+            *("2108", "004b", "2180", "d000", "0c81", "006d", "0003", "c417", "1003"),
         ]
 
     @pytest.mark.parametrize(("hertz", "word"), [(4.16, 0x01A0), (2.64, 0x0108), (2.66, 0x010A)])

@@ -40,6 +40,8 @@ FAMILIES = {
     24: "fc51",
     25: "wj200",
     26: "h100",
+    27: "vfd-e",
+    28: "yl620",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -121,7 +123,7 @@ def test_identification_is_the_family_s_own_or_refused(bus: Bus) -> None:
     for family in FAMILIES.values():
         if family in codes:
             assert read(bus, family, 0x2103) == [codes[family]]
-        elif family == "ms300":  # its output frequency: manual, p. 799
+        elif family in ("ms300", "vfd-e"):  # its output frequency: manuals, pp. 799 and 4-126
             assert read(bus, family, 0x2103) == [0]
         elif family == "eds300":  # 03H says that there is no such address: manual, p. 45
             assert refusal(bus, family, pdu(0x03, 0x2103, 1)) == 0x03
@@ -233,6 +235,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
         if family in (
             "chf100a",
             "ms300",
+            "yl620",
             "saj8000m",
             "eds300",
             "sunfar-e300",

@@ -52,10 +52,11 @@ SILENT_ON_CODES = [
     "acs355",
     "wj200",
     "h100",
+    "yl620",
 ]
 """The families whose units refuse 2103H."""
 
-SIGNED = ["vfd500", "a1000", "eds300", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "wj200", "h100"]
+SIGNED = ["vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "wj200", "h100"]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
 NO_SIGNATURE = [family for family in SILENT_ON_CODES if family not in SIGNED]
@@ -80,8 +81,10 @@ TAKEN_FOR: dict[str, list[str]] = {
     "wj200": ["wj200"],
     # And this one answers 04H, which no other does.
     "h100": ["h100"],
-    # And this one 2104H and 2106H.
+    # And this one 2104H and 2106H, this one 2108H and 2109H, and this one 200BH and 2012H.
     "ms300": ["ms300"],
+    "vfd-e": ["vfd-e"],
+    "yl620": ["yl620"],
     # And this one 004BH and 0034H, this one 2180H, and this one D000H.
     "a1000": ["a1000"],
     "eds300": ["eds300"],
@@ -116,8 +119,9 @@ SAYS = {
     "gd200a": "0107H",
 }
 
-ASKED_FOR_NO_CODE = ["ms300"]
-"""Families that have something else where others have a code: what stands there is not asked for, since it is none."""
+ASKED_FOR_NO_CODE = ["ms300", "vfd-e", "yl620"]
+"""Families that have something else where others have a code: what stands there is not asked for, since it is none.
+A YL620 is told by what it answers alone."""
 
 SMALL, LARGE = ["chf100a", "chv100", "saj8000m"], ["gd600", "gd600-rectifier", "gd3000", "gd3000-rectifier"]
 

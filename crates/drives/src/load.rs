@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 26] = [
+static BUILTINS: [Builtin; 28] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -160,6 +160,8 @@ static BUILTINS: [Builtin; 26] = [
     builtin!("chf100a": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("chv100": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("ms300": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("vfd-e": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("yl620": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("a1000": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("saj8000m": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("eds300": "registers.csv" "parameters.csv" "faults.csv"),

@@ -160,3 +160,17 @@ fn no_read_leaves_its_group_and_none_cuts_a_value_in_two() {
     let values: Vec<String> = meter.values(&[0x86A0, 0x0001]).map(|(_, value)| value.unwrap().to_string()).collect();
     assert_eq!(values, ["100000"], "the low word comes first (manual, p. 137)");
 }
+
+/// A table that names the VFD-E manual: one parameter a read. Its registers are read together, as the manual does (p. 170).
+#[test]
+fn a_parameter_is_read_alone_where_the_family_says_so() {
+    let profile = Profile::builtin("vfd-e").unwrap();
+    let spans = |names: &[&str]| {
+        let entries: Vec<&Entry> = names.iter().map(|name| profile.find(name).unwrap()).collect();
+        let spans = profile.plan(entries).unwrap();
+        spans.iter().map(|span| (span.address, span.count)).collect::<Vec<_>>()
+    };
+    assert_eq!(spans(&["02.00", "02.01"]), [(0x0200, 1), (0x0201, 1)]);
+    assert_eq!(spans(&["set_frequency_actual", "running_frequency"]), [(0x2102, 2)]);
+    assert_eq!(spans(&["05.01", "running_frequency", "05.00"]), [(0x0500, 1), (0x0501, 1), (0x2103, 1)]);
+}

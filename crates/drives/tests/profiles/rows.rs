@@ -214,7 +214,9 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("saj8000m", 14),
         ("sunfar-e300", 6),
         ("v20", 19),
+        ("vfd-e", 23),
         ("vfd500", 47),
+        ("yl620", 33),
     ];
     assert_eq!(all, expected.into());
 }

@@ -31,7 +31,9 @@ mod sunfar;
 mod unlisted;
 mod v20;
 mod vfd500;
+mod vfd_e;
 mod wj200;
+mod yl620;
 
 use std::borrow::Cow;
 
@@ -136,7 +138,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 26] = [
+const FAMILIES: [fn() -> Family; 28] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -153,6 +155,8 @@ const FAMILIES: [fn() -> Family; 26] = [
     chf100a::chf100a,
     chf100a::chv100,
     ms300::ms300,
+    vfd_e::vfd_e,
+    yl620::yl620,
     a1000::a1000,
     saj8000m::saj8000m,
     eds300::eds300,

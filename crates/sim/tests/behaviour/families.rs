@@ -194,13 +194,16 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "v20",
         "acs355",
         "h100",
+        "yl620",
     ] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }
     // It has a code of its own for that.
     Bench::of("eds300").refuses_read(0x2103, 1, 0x03);
-    // Its output frequency stands there.
-    assert_eq!(Bench::of("ms300").read::<1>(0x2103), [0]);
+    // Their output frequency stands there.
+    for family in ["ms300", "vfd-e"] {
+        assert_eq!(Bench::of(family).read::<1>(0x2103), [0], "{family}");
+    }
 }
 
 #[test]

@@ -7,6 +7,7 @@
 
 mod anything;
 mod bench;
+mod deltas;
 #[cfg(target_os = "linux")]
 mod ears;
 mod families;
