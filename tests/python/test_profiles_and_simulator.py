@@ -40,7 +40,9 @@ READ_ONLY = {
     ),
 }
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
-OUT_OF_RANGE = dict.fromkeys(["ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "v20", "wj200", "h100"], 0x03)
+OUT_OF_RANGE = dict.fromkeys(
+    ["ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "v20", "wj200", "h100"], 0x03
+)
 """And a value that is out of range, where it is not their 04H."""
 
 WITHOUT = {"vfd500": {"jog_stop"}, "fc51": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"}}
