@@ -12,7 +12,7 @@ HELD = 0x300
 """Registers that are asked for; the units have more."""
 
 
-def ask_by_pymodbus(port: str, count: int, timeout: float = 0.2) -> None:
+def ask_by_pymodbus(port: str, count: int, timeout: float = 1.0) -> None:
     """*count* requests by pymodbus; one that gets no answer is repeated once."""
     client = ModbusSerialClient(port, baudrate=19200, parity="N", timeout=timeout, retries=1)
     assert client.connect()

@@ -356,7 +356,7 @@ def test_a_killed_program_leaves_the_drive_to_its_watchdog(simulator: Simulator,
 
 def test_a_watchdog_that_nobody_closed_is_left_to_the_drive(simulator: Simulator) -> None:
     body = """
-    watchdog = drive.watchdog(1.0, unverified=True)
+    watchdog = drive.watchdog(3.0, unverified=True)
     drive.run(10.0)
     running()
     """

@@ -61,7 +61,7 @@ def line() -> Iterator[Line]:
 
 @contextmanager
 def opened(kind: str, line: Line, **how: Any) -> Iterator[drivebus.Bus]:
-    how = {"parity": "N", "timeout": 0.8, "retries": 0, **how}
+    how = {"parity": "N", "timeout": 2.0, "retries": 0, **how}
     if kind == "serial":
         with serial.Serial(line.path, 19200) as port, drivebus.Bus(port, **how) as bus:
             yield bus

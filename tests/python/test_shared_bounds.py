@@ -243,7 +243,7 @@ print(*bus.stats()["notes"], sep=" | ", flush=True)
 @pytest.mark.usefixtures("folder")
 def test_who_listens_and_does_not_read_holds_up_nobody(motor: OwnMotor) -> None:
     """What it missed is counted and told; nobody waited for it, since all of it would have come otherwise."""
-    with Bus(motor.port, parity="N") as bus, program(LISTENS, motor.port) as guest:
+    with Bus(motor.port, parity="N", timeout=3.0) as bus, program(LISTENS, motor.port) as guest:
         drive = bus.drive(1, "gd350")
         drive.run(hz=10.0)
         while not guest.has_said_more():
