@@ -113,7 +113,7 @@ def test_on_a_hostile_line_no_pair_is_wrong(serve: Callable[..., str]) -> None:
     with tapped(0.016, rate=0.02, seed=3) as tap:
         serve("pymodbus_server", tap.unit)
         with ear(tap) as heard:
-            ask_by_pymodbus(tap.master, 150)
+            ask_by_pymodbus(tap.master, 150, timeout=0.4)
         intact, paired, wrong = tap.score(heard)
     assert wrong == 0
     # Where a busy machine lets few through, a single one is more than two in a hundred.
