@@ -68,8 +68,7 @@ RECTIFIERS = ("gd600-rectifier", "gd3000-rectifier")
 INVT_STOP = (0x2000, 5)
 
 _STEP = 25
-"""From one case of the sample to the next: one by which the sample meets each pair of families and each kind of case,
-which a test says."""
+"""From one case of the sample to the next: one by which the sample meets each kind of case, which a test says."""
 
 
 class Case(NamedTuple):
@@ -131,11 +130,16 @@ def sample(family: str, by: str) -> list[Case]:
     # What asyncio tells is what Python tells, awaited: half as many show that.
     step = 2 * _STEP if by == "asyncio" else _STEP
     # Of those without a name there is one for each family, and they are few.
-    return [
+    taken = [
         case
         for number, case in enumerate(every)
         if number % step == begin % step or (case.by, case.known) == ("command line", "identified")
     ]
+    if by != "python":
+        return taken
+    # However many families there are, each is named as each other one.
+    left_out = {case.named: case for case in every} | {case.named: None for case in taken}
+    return taken + [case for case in left_out.values() if case is not None]
 
 
 def refusals(ends: list[str]) -> list[tuple[str, int, float]]:
