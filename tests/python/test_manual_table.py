@@ -68,6 +68,24 @@ def test_a_table_becomes_registers(tmp_path: Path) -> None:
     assert "line 8 is left out: its address is that of line 5" in done.stderr
 
 
+def test_what_a_second_column_of_text_says_is_a_step_or_a_note(tmp_path: Path) -> None:
+    text = (
+        "Address,Contents,Meaning\n"
+        "1400H,Operation command,0011H run forward\n"
+        '1401H,Frequency reference,"0 - C01, in 0.1 Hz"\n'
+        "1501H,Output frequency,0.1 Hz\n1502H,Output current,0.01 A\n1507H,Counter,\n"
+    )
+    assert new(tmp_path, text).exit_code == 0
+    assert [(row["name"], row["unit"], row["scale"], row["note"]) for row in rows(tmp_path)] == [
+        ("operation_command", "", "", "the table says '0011H run forward'"),
+        ("frequency_reference", "", "", "the table says '0 - C01, in 0.1 Hz'"),
+        ("output_frequency", "Hz", "10", ""),
+        ("output_current", "A", "100", ""),
+        # No column says that it has no unit.
+        ("counter", "", "", ""),
+    ]
+
+
 @pytest.mark.parametrize(
     ("titles", "cells", "options", "wanted"),
     [

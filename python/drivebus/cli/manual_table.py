@@ -24,8 +24,8 @@ COUNTS = ("hex", "decimal", "40001")
 
 _TITLES = {
     "address": r".*\baddr(ess|\.)?\b.*|register|reg\.?|location",
-    "label": r"(function |parameter |register )?(name|description|definition)|function|meaning|item|designation|content"
-    r"|parameter|explanation|data",
+    "label": r"(function |parameter |register )?(name|description|definition)|function|meaning|item|designation"
+    r"|contents?|parameter|explanation|data",
     "unit": r"units?",
     "step": r"resolution|step|increment|precision|accuracy|min(\.|imum)? unit",
     "scale": r"scale|scaling",
@@ -181,6 +181,8 @@ def _columns(titles: Sequence[str]) -> dict[str, int]:
     for place, title in enumerate(titles):
         plain = " ".join(re.sub(r"\(.*?\)", " ", title.lower()).split())
         what = next((what for what, words in _TITLES.items() if re.fullmatch(words, plain)), None)
+        if what == "label" and what in places:
+            what = "says"
         if what is not None:
             places.setdefault(what, place)
     for what, wanted in (("address", "an address"), ("label", "a name")):
@@ -230,13 +232,13 @@ def _place(cell: str, count: str) -> tuple[str, int] | None:
 def _take_step(row: TableRow, cells: dict[str, str]) -> None:
     """Unit and scale, from a step such as `0.01Hz`, a unit, or counts in one unit."""
     step = None
-    for what in ("unit", "step", "scale"):
+    for what in ("unit", "step", "scale", "says"):
         said = _plain(cells.get(what, ""))
         if not said or said == "-":
             continue
         found = _STEP.fullmatch(said)
         if found is None:
-            row.notes.append(f"the table has {said!r} as its {what}")
+            row.notes.append(f"the table says {said!r}" if what == "says" else f"the table has {said!r} as its {what}")
             continue
         row.unit = row.unit or (found["unit"] or "").replace("r/min", "rpm").replace("℃", "°C")
         if found["step"]:
@@ -244,7 +246,9 @@ def _take_step(row: TableRow, cells: dict[str, str]) -> None:
             # Counts in one unit, where it is more than one and the column does not call it a step.
             step = 1 / number if what == "scale" and number > 1 else number
     if step is None:
-        row.scale = 1 if not row.unit and not row.notes and not cells.get("unit") else None
+        # Where no column has a step or a unit, nothing says that there is none.
+        is_told = any(cells.get(what) is not None for what in ("unit", "step", "scale"))
+        row.scale = 1 if is_told and not row.unit and not row.notes and not cells.get("unit") else None
     elif step and 1 / step in _SCALES:
         row.scale = int(1 / step)
     else:
