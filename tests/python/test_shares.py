@@ -11,9 +11,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
+from tests.python.conftest import NO_PTY
 
 import drivebus
 from drivebus import Bus, Drive, Profile, Simulator, State, rtu, trial
+from drivebus.cli import cli
 from drivebus.line.meaning import meaning
 
 SHARE = Path(__file__).resolve().parents[2] / "crates/sim/tests/profiles/share"
@@ -148,3 +151,47 @@ def test_the_whole_may_be_any_value_of_the_parameter(tmp_path: Path) -> None:
             assert line.drive(1).frequency == pytest.approx(10.0, abs=0.01)
             drive.stop()
             drive.wait_until_stopped(timeout=20)
+
+
+def changed(folder: Path, **replaced: tuple[str, str]) -> Path:
+    """The profile in *folder*, with one text replaced by another in each file."""
+    shutil.copytree(SHARE, folder)
+    for name, (what, by) in replaced.items():
+        file = next(folder.glob(f"{name}.*"))
+        text = file.read_text()
+        assert what in text
+        file.write_text(text.replace(what, by, 1))
+    return folder
+
+
+def test_a_profile_that_tells_no_state_runs_where_nothing_else_fits(line: Simulator, tmp_path: Path) -> None:
+    """Nothing that such a unit answers shows it to be what it was named as, and all others are ruled out."""
+    text = (SHARE / "profile.toml").read_text()
+    state = text[text.index("[state]") : text.index("[bits]")]
+    folder = changed(tmp_path / "stateless", profile=(state, ""))
+    with Bus(line) as bus:
+        drive = bus.drive(1, profile=folder)
+        drive.prepare_control(store=True)
+        drive.run(hz=10.0)
+        line.advance(5.0)
+        assert line.drive(1).state == "forward"
+        drive.stop()
+        line.advance(5.0)
+        assert line.drive(1).state == "stopped"
+
+
+@NO_PTY
+def test_who_waits_and_cannot_look_is_told_that_the_motor_may_turn(tmp_path: Path) -> None:
+    folder = changed(tmp_path / "elsewhere", registers=("0x0010,hertz", "0x0019,hertz"))
+    with Simulator({1: SHARE}, transport="pty") as line:
+        words = ["--port", line.port, "--profile", str(folder)]
+        assert CliRunner().invoke(cli, [*words, "prepare", "--store", "--yes"]).exit_code == 0
+        done = CliRunner().invoke(cli, [*words, "run", "10", "--yes", "--wait", "5"])
+        assert done.exit_code == 7
+        said = " ".join(done.stderr.split())
+        assert "unit 1 took the start, and what it does could not be looked at: unit 1 refused to read" in said
+        assert "0019H" in said
+        assert "The motor may turn; `drivebus" in said
+        assert line.drive(1).state == "forward"
+        CliRunner().invoke(cli, [*words, "stop"])
+        assert line.drive(1).state == "stopped" or line.drive(1).writes()[-1][1:] == (0x0008, 0)

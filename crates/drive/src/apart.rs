@@ -137,10 +137,12 @@ impl Apart {
             return Verdict::Ask(place);
         }
         let is_command = matches!(what, What::Command(_));
-        if self.is_trusted || is_live && (is_command || self.has_words()) {
+        let takes_commands = |family: &&Arc<Family>| !family.profile().commands().is_empty();
+        let is_all_that_is_left = !named.is_known_by_something() && !others.iter().any(takes_commands);
+        if self.is_trusted || is_live && (is_command || self.has_words() || is_all_that_is_left) {
             return Verdict::Take(Arc::clone(named));
         }
-        Verdict::Undecided(live.into_iter().filter(|family| !family.profile().commands().is_empty()).cloned().collect())
+        Verdict::Undecided(live.into_iter().filter(takes_commands).cloned().collect())
     }
 
     /// The verdict where it takes fewer questions to rule out whom of `others` the `command` would harm than to see what

@@ -103,7 +103,7 @@ impl Family {
     }
 
     /// Not so of somebody's own that says nothing of how its units are known: they may be anything.
-    fn is_known_by_something(&self) -> bool {
+    pub(crate) fn is_known_by_something(&self) -> bool {
         self.profile().role("identification").is_some() || self.signature().is_some() || self.is_shipped()
     }
 

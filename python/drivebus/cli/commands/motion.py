@@ -293,9 +293,20 @@ def _say_lost(text: str) -> None:
 
 @contextmanager
 def _told_that_it_runs(session: Session, drive: drivebus.Drive) -> Iterator[None]:
-    """Whoever ends a wait by Ctrl-C is told that the motor goes on, and how to stop it."""
+    """Whoever ends a wait by Ctrl-C, or cannot look at the drive, is told that the motor goes on, and how to stop it."""
     try:
         yield
+    except drivebus.Unconfirmed:
+        raise
+    except drivebus.DrivebusError as error:
+        raise drivebus.Unconfirmed(
+            Text(
+                f"{session.called} took the start, and what it does could not be looked at: ",
+                error.text,
+                f". The motor may turn; `{session.command('stop')}` stops it",
+            ),
+            unit=drive.unit,
+        ) from error
     except KeyboardInterrupt as error:
         doing = ""
         with suppress(drivebus.DrivebusError):
