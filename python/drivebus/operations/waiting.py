@@ -98,7 +98,9 @@ def _untold(unit: DriveView, what: str, role: str | None) -> NotAllowed:
     name = unit.profile.role(role)
     if name is not None:
         return refusal_of(unit.evidence.require_readable, [name])
+    then = "; give the speed: wait_for_speed(hz)" if role == "setpoint" else ""
     return BadArgument(
-        f"{what} of unit {unit.address} needs its {role}, and {unit.profile.title} has no register of it that is known",
+        f"{what} of unit {unit.address} needs its {role}, and {unit.profile.title} has no register of it that is "
+        f"known{then}. Nothing was sent, and the motor goes on as it was",
         unit=unit.address,
     )
