@@ -89,6 +89,23 @@ def test_where_nobody_answers_the_doctor_is_named(words: list[str]) -> None:
     assert result.stderr.splitlines()[-1] == f"What may be wrong: `drivebus doctor '{SIM}' --unit 9 --format 8N1`"
 
 
+@pytest.mark.parametrize(
+    ("family", "options", "said"),
+    [
+        ("vfd500", [], ["From the factory Veikong VFD500 has other settings: `--baud 9600 --format 8N1 --unit 1`"]),
+        ("vfd500", ["--baud", "9600", "--format", "8N1"], []),
+        ("gd350", [], []),
+    ],
+)
+def test_who_gets_no_answer_is_told_how_the_factory_sets_the_family(
+    family: str, options: list[str], said: list[str]
+) -> None:
+    with drivebus.Simulator({7: "gd350"}, transport="tcp") as line:
+        result = CliRunner().invoke(cli, ["--port", line.port, *options, "--profile", family, "status"])
+    assert result.exit_code == 3
+    assert [row for row in result.stderr.splitlines() if "factory" in row] == said
+
+
 def test_what_the_line_has_no_part_in_names_no_doctor() -> None:
     for words in (["decode", "01 03 21 03 00 01 00 00"], ["read", "6300H"], ["read", "nosuch"]):
         assert "doctor" not in run(*words).stderr

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from typing import IO, TYPE_CHECKING, Any
 
@@ -297,12 +297,28 @@ class Session:
         silent = next((each for each in errors if isinstance(each, (drivebus.NoAnswer, drivebus.BadAnswer))), None)
         # A frame that is only taken apart came from nobody.
         if silent is not None and silent.unit and self.port is not None:
+            if isinstance(silent, drivebus.NoAnswer):
+                self._name_factory_settings()
             remark(f"What may be wrong: `{self.doctor(silent.unit)}`")
 
         if self.profile and os.path.isdir(self.profile):  # noqa: PTH112 - Path raises where a name is too long
             problems = len(drivebus.Profile.check(self.profile))
             if problems > 1:
                 remark(f"All {problems}: `drivebus profiles check {_quoted(self.profile)}`")
+
+    def _name_factory_settings(self) -> None:
+        """Says how the factory sets drives of the family that was named, where that is not how it was asked."""
+        if self.profile is None or self.name:
+            return
+        with suppress(drivebus.DrivebusError):
+            profile = drivebus.Profile.find(self.profile)
+            factory = profile.serial()
+            if factory is None:
+                return
+            unit = factory.unit or self.unit
+            if (factory.baud_rate, factory.format, unit) != (self.baud, "".join(self.line_format), self.unit):
+                settings = f"--baud {factory.baud_rate} --format {factory.format} --unit {unit}"
+                remark(f"From the factory {profile.title} has other settings: `{settings}`")
 
     def command(self, name: str) -> str:
         """The command *name* for the same drive, as it can be typed."""

@@ -293,7 +293,7 @@ def _say_lost(text: str) -> None:
 
 @contextmanager
 def _told_that_it_runs(session: Session, drive: drivebus.Drive) -> Iterator[None]:
-    """Whoever ends a wait by Ctrl-C, or cannot look at the drive, is told that the motor goes on, and how to stop it."""
+    """Whoever ends a wait by Ctrl-C, or cannot look, is told that the motor goes on, and how to stop it."""
     try:
         yield
     except drivebus.Unconfirmed:
