@@ -180,6 +180,15 @@ def test_a_profile_that_tells_no_state_runs_where_nothing_else_fits(line: Simula
         assert line.drive(1).state == "stopped"
 
 
+def test_what_a_profile_lacks_to_run_a_motor_is_noted_and_no_mistake(tmp_path: Path) -> None:
+    text = (SHARE / "profile.toml").read_text()
+    state = text[text.index("[state]") : text.index("[bits]")]
+    done = CliRunner().invoke(cli, ["profiles", "check", str(changed(tmp_path / "less", profile=(state, "")))])
+    assert (done.exit_code, "is sound" in done.stdout) == (0, True)
+    assert done.stderr == "Note: [state] is missing: a start and a stop are proved by nothing it shows.\n"
+    assert CliRunner().invoke(cli, ["profiles", "check", str(SHARE)]).stderr == ""
+
+
 @NO_PTY
 def test_who_waits_and_cannot_look_is_told_that_the_motor_may_turn(tmp_path: Path) -> None:
     folder = changed(tmp_path / "elsewhere", registers=("0x0010,hertz", "0x0019,hertz"))

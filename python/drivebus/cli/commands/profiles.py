@@ -61,6 +61,24 @@ def check(context: click.Context, session: Session, folder: Path) -> None:
     totals = {kind: counts[kind]["total"] for kind in KINDS}
     rows = ", ".join(f"{total} {kind if total != 1 else kind.removesuffix('s')}" for kind, total in totals.items())
     session.out.say(f"{folder} is sound: {rows}.")
+    _say_what_is_missing(profile)
+
+
+def _say_what_is_missing(profile: drivebus.Profile) -> None:
+    """What a drive that is controlled by name would have, too: no mistake in a profile that is only for watching."""
+    if profile.kind != "inverter":
+        return
+    have = profile.commands()
+    lacks = [
+        ("[commands.codes] has no run_forward", "run_forward" in have, "it cannot be started by name"),
+        ("[commands.codes] has neither stop nor coast", bool({"stop", "coast"} & set(have)), "nothing is started"),
+        ("[state] is missing", profile.role("state") is not None, "a start and a stop are proved by nothing it shows"),
+        ("[setpoints.frequency] is missing", profile.role("setpoints.frequency") is not None, "it gets no speed"),
+        ("[[control]] is missing", bool(profile.control()), "whether it obeys the bus is not looked at"),
+    ]
+    for what, is_there, then in lacks:
+        if not is_there:
+            remark(f"Note: {what}: {then}.")
 
 
 def _warn(profile: drivebus.Profile) -> None:
