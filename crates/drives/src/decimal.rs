@@ -30,6 +30,11 @@ const MOST_DIGITS: i64 = 12;
 const MOST_EXPONENT: i64 = 1_000_000;
 
 impl Decimal {
+    /// `number` by its shortest digits that read back as the same float; `None` for what is no number.
+    pub(crate) fn of_float(number: f64) -> Option<Self> {
+        Self::parse(&format!("{number:?}"))
+    }
+
     /// Reads `text`: an optional sign, digits with at most one point, an optional exponent. `None` for anything else.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let (negative, text) = match text.as_bytes().first()? {

@@ -304,7 +304,7 @@ fn variant_quantity(row: &manifest::VariantChoice) -> Result<Quantity, String> {
     let (least, most) = limits(row.signed, false);
     let bound = |value: Option<f64>| {
         let Some(value) = value else { return Ok(None) };
-        match Decimal::parse(&format!("{value:?}")).map(|number| scale.count(&number)) {
+        match Decimal::of_float(value).map(|number| scale.count(&number)) {
             Some(Counts::Whole(count)) if (least..=most).contains(&count) => Ok(Some(count)),
             _ => Err(format!("{value} does not fit a word with this scale and sign")),
         }

@@ -90,8 +90,7 @@ impl Share {
     /// The bounds of the parameter, of which `low` and `high` say the values, or what is wrong with them.
     pub(crate) fn bounds(parameter: &Quantity, low: f64, high: f64) -> Result<(u32, u32), String> {
         let (_, most) = limits(false, parameter.wide);
-        let count = |value: f64| match Decimal::parse(&format!("{value:?}")).map(|number| parameter.counts_of(&number))
-        {
+        let count = |value: f64| match Decimal::of_float(value).map(|number| parameter.counts_of(&number)) {
             Some(Counts::Whole(count)) if (1..=most).contains(&count) => {
                 u32::try_from(count).map_err(|_| format!("{value} is more than two words hold"))
             }

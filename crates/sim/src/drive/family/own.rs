@@ -195,21 +195,21 @@ impl Own<'_> {
         // Of two words the low one tells.
         let decider = variant.and_then(|variant| self.profile.find(&variant.parameter).ok());
         let parameter = decider.and_then(low_word);
-        let share = variant.and_then(|variant| variant.share.as_ref()).zip(decider).map(|(share, decider)| {
-            let (counts, bounds) = (f64::from(share.counts), Bounds { signed: share.signed, ..Bounds::NONE });
+        let share = variant.and_then(|variant| variant.share.as_ref()).zip(decider);
+        let of_factory = share.map(|(share, decider)| {
             let factory = decider.default_raw().map_or(USUAL_MAX_HZ, |raw| decider.decode(raw).to_f64());
-            (counts, SpeedScale { bounds, ..SpeedScale::share(counts, factory) })
+            let bounds = Bounds { signed: share.signed, ..Bounds::NONE };
+            SpeedScale { bounds, ..SpeedScale::share(share.counts.into(), factory) }
         });
-        let usual = self.scale(entry.quantity()).or_else(|| choices.first().map(|&(_, scale)| scale));
-        let usual = usual.or(share.map(|(_, usual)| usual));
+        let usual = self.scale(entry.quantity()).or_else(|| choices.first().map(|&(_, scale)| scale)).or(of_factory);
         let Some(usual) = usual else {
             let what = format!("{} (registers.csv) is not in Hz, % or rpm, with a scale that is known", entry.name());
             self.miss(PLACE, &what);
             return None;
         };
-        let unit = parameter.map(|address| match share.zip(decider) {
-            Some(((whole, _), decider)) => {
-                Deciding::Share(Scaled { address, counts: counts(decider.quantity()) }, whole)
+        let unit = parameter.map(|address| match share {
+            Some((share, decider)) => {
+                Deciding::Share(Scaled { address, counts: counts(decider.quantity()) }, share.counts.into())
             }
             None => Deciding::Words(address, choices),
         });
