@@ -11,6 +11,7 @@ from pathlib import Path
 
 import tomli
 
+import drivebus
 from drivebus.sim import FAULT_KINDS
 
 HERE = Path(__file__).resolve().parent
@@ -400,22 +401,23 @@ def operations() -> dict[str, bytes]:
     soon = 2 << 4
     identify, check, stop, coast = 0, 1, 3, 4
     run, run_at, jog_back, reset = 0x48, 0x4C, 0x4B, 0x4F
+    families = range(len(drivebus.profiles()))
     return {
         "nothing": b"",
-        **{f"stop-{family}": bytes([family, stop, 40, 20]) + bytes([soon | same]) * 200 for family in range(26)},
-        **{f"coast-{family}": bytes([family, coast, 40, 20]) + bytes([soon | small, 3] * 100) for family in range(26)},
+        **{f"stop-{family}": bytes([family, stop, 40, 20]) + bytes([soon | same]) * 200 for family in families},
+        **{f"coast-{family}": bytes([family, coast, 40, 20]) + bytes([soon | small, 3] * 100) for family in families},
         "identify-code": bytes([0, identify, 0, 0, soon | code, 3]) + bytes([soon | same]) * 40,
         "identify-refusals": bytes([0, identify, 0, 0]) + bytes([soon | refused, 2]) * 60,
         "check-lost": bytes([1, check, 0, 0]) + bytes([soon | lost, soon | word, 1, 0xA0]) * 10,
         "stop-busy": bytes([2, stop, 200, 40]) + bytes([soon | refused, 6]) * 80,
         "stop-damaged": bytes([0, stop, 200, 40]) + bytes([soon | damaged, 3, 1, 3, 2]) * 40,
         "stop-silent": bytes([0, stop, 100, 100, silence]),
-        **{f"run-{family}": bytes([family, run, 0, 40]) + bytes([soon | same, 0] * 100) for family in range(26)},
+        **{f"run-{family}": bytes([family, run, 0, 40]) + bytes([soon | same, 0] * 100) for family in families},
         **{
             f"run-at-{family}": bytes([family, run_at, 0, 40, 10]) + bytes([soon | small, 3] * 90)
-            for family in range(26)
+            for family in families
         },
-        **{f"reset-{family}": bytes([family, reset, 0, 40]) + bytes([soon | small, 4] * 90) for family in range(26)},
+        **{f"reset-{family}": bytes([family, reset, 0, 40]) + bytes([soon | small, 4] * 90) for family in families},
         "jog-halted": bytes([14, jog_back, 0, 40]) + bytes([soon | small, 3] * 9) + b"\xff" * 20,
         "run-lost": bytes([14, run, 0, 40]) + bytes([soon | same, 0] * 9) + bytes([lost, soon | small, 2] * 30),
         "stop-another": bytes([0, stop, 100, 100]) + bytes([soon | code, 9, soon | small, 1]) * 60,

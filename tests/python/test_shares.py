@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from tests.python.conftest import NO_PTY
+from tests.python.test_broken_profiles import change
 
 import drivebus
 from drivebus import Bus, Drive, Profile, Simulator, State, rtu, trial
@@ -157,10 +158,7 @@ def changed(folder: Path, **replaced: tuple[str, str]) -> Path:
     """The profile in *folder*, with one text replaced by another in each file."""
     shutil.copytree(SHARE, folder)
     for name, (what, by) in replaced.items():
-        file = next(folder.glob(f"{name}.*"))
-        text = file.read_text()
-        assert what in text
-        file.write_text(text.replace(what, by, 1))
+        change(next(folder.glob(f"{name}.*")), what, by)
     return folder
 
 
