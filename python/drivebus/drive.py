@@ -110,6 +110,7 @@ class Drive(BlockingFormerNames):
     ping = blocking(state.ping)
     state = blocking(state.state)
     contradiction = blocking(registers.contradiction)
+    check_speed = blocking(waiting.check_speed)
     wait_for_speed = blocking(waiting.wait_for_speed)
     wait_until_stopped = blocking(waiting.wait_until_stopped)
     check_control = blocking(bus_control.check_control)

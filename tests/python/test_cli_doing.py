@@ -61,7 +61,7 @@ def test_a_motor_that_speeds_up_is_said_to(line: Simulator) -> None:
 
 @pytest.mark.skipif(sys.version_info < (3, 11), reason="errors have no notes")
 def test_who_interrupts_a_wait_is_told_that_the_motor_runs(line: Simulator, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(drive: drivebus.Drive, **_: object) -> None:
+    def interrupted(drive: drivebus.Drive, *_: object, **__: object) -> None:
         drive.bus.sleep(1.0)
         raise KeyboardInterrupt
 

@@ -93,6 +93,7 @@ class Drive(AwaitedFormerNames):
     ping = awaited(state.ping)
     state = awaited(state.state)
     contradiction = awaited(registers.contradiction)
+    check_speed = awaited(waiting.check_speed)
     wait_for_speed = awaited(waiting.wait_for_speed)
     wait_until_stopped = awaited(waiting.wait_until_stopped)
     check_control = awaited(bus_control.check_control)

@@ -17,8 +17,9 @@ from drivebus.profile.evidence import refusal_of
 if TYPE_CHECKING:
     from drivebus.values import Status
 
-__all__ = ["check_standstill", "wait_for_speed", "wait_until_stopped"]
+__all__ = ["check_speed", "check_standstill", "wait_for_speed", "wait_until_stopped"]
 
+_SPEED = "waiting for the speed"
 _STANDSTILL = "waiting for the standstill"
 
 
@@ -47,7 +48,7 @@ async def wait_for_speed(
     unit = unit.trusting(unverified)
     kind, told = await call_core(unit, lambda core: core.wait_for_speed(wanted, tolerance, timeout))
     if kind != "done":
-        raise _in_words(unit, "waiting for the speed", f"{goal} was not reached within {timeout:g} s", kind, told)
+        raise _in_words(unit, _SPEED, f"{goal} was not reached within {timeout:g} s", kind, told)
     return state.shown(unit, told)
 
 
@@ -68,6 +69,24 @@ async def wait_until_stopped(unit: DriveView, timeout: float = 60.0, *, unverifi
     if kind != "done":
         raise _in_words(unit, _STANDSTILL, f"it did not stop within {timeout:g} s", kind, told)
     return state.shown(unit, told)
+
+
+async def check_speed(unit: DriveView, hz: float | None = None, *, unverified: bool = False) -> None:
+    """Checks that `wait_for_speed` can look, for who starts a motor and waits for it. Nothing is sent.
+
+    Args:
+        hz: As `wait_for_speed` will have it: with None, the setpoint must be told, too.
+        unverified: Also by words that are not verified for the family.
+
+    Raises:
+        NotAllowed: State, frequency or setpoint of the family are not known, or not verified.
+    """
+    unit = unit.trusting(unverified)
+    state.state_word(unit, _SPEED)
+    for role in ("frequency", "setpoint") if hz is None else ("frequency",):
+        name = unit.profile.role(role)
+        if name is None or unit.evidence.unreadable(name) is not None:
+            raise _untold(unit, _SPEED, role)
 
 
 def check_standstill(unit: DriveView, timeout: float) -> None:
