@@ -794,12 +794,14 @@ class Values:
     The result of each task is `"done"` and what it says; or a kind of reason, and what is told of it, which is a kind
     and what is told of that again, as of `Unit`, and besides:
 
-    `"not_kept"` has the names that were written before, and the kind: `"not_planned"`, the name, a kind
-    (`"read_only"`, `"moves"`, `"may_not"`, `"only_stored"`, `"no_range"`, `"may_not_keep"`) and the word whose range is
-    not printed; `"decides"`, the name and another whose meaning it decides; `"unsays"`, the name, a variant and what
-    that was said to be; `"not_settled"`; `"running"`, names and the state; `"beyond"`, a name with its value and unit,
-    the same of its limit, and whether it is below; `"not_written"`, the names of the request, why, and None or what is
-    in force: `"shown"` and names with their values and units, or `"unread"` and the error; `"failed"` and the error.
+    `"not_kept"` has the names that were written before, and the kind: `"not_planned"`, the name, a kind (`"read_only"`,
+    `"moves"`, `"stores"`, `"may_not"`, `"only_stored"`, `"no_range"`, `"may_not_keep"`) and the word whose range is not
+    printed; `"decides"`, the name and another whose meaning it decides; `"unsays"`, the name, a variant and what that
+    was said to be; `"not_settled"`; `"running"`, names and the state; `"beyond"`, a name with its value and unit, the
+    same of its limit, and whether it is below; `"not_written"`, the names of the request, why, and None or what is in
+    force: `"shown"` and names with their values and units, or `"unread"` and the error; `"not_stored"`, and `"may_not"`
+    and why, `"unread"` or `"unseen"` and the error, `"not_idle"` and what stands there and should, `"late"` and what
+    still does, or `"not_written"` and why; `"failed"` and the error.
 
     `"not_prepared"`: `"no_setpoint"`; `"by_hand"` or `"may_not"` and a setting; `"not_kept"`; `"unshown"` and settings.
     `"not_given"`: `"no_register"`; `"ignored"` and settings; `"not_kept"` without names. `"not_set_bits"`:
@@ -812,6 +814,9 @@ class Values:
         """Those of *unit*."""
     def write(self, wanted: Sequence[tuple[str, object]], store: bool, /) -> Task:
         """Writes values, to EEPROM where *store*. Or `"not_kept"`."""
+
+    def store(self, /) -> Task:
+        """Stores all that is in RAM, where the family has a word for that. Or `"not_stored"`, as in `"not_kept"`."""
     def prepare(self, setpoint: str, store: bool, /) -> Task:
         """Sets the drive to obey the bus, and to take *setpoint* from it: settings. Or `"not_prepared"`."""
     def give_setpoint(self, setpoint: str, value: float, /) -> Task:

@@ -23,9 +23,11 @@ def stored(simulator: Simulator) -> list[int]:
     return [address for _, address, _ in simulator.drive(1).take_writes() if not address & RAM]
 
 
-def times_stored(simulator: Simulator) -> Counter[int]:
-    """How often each address of any family was written since it was asked last."""
-    return Counter(address for _, address, _ in simulator.drive(1).take_writes())
+def times_stored(simulator: Simulator, drive: Drive) -> Counter[int]:
+    """How often each address of a *drive* of any family was written since asked last, but for what stores all."""
+    memory = drive.profile.memory()
+    store = None if memory is None or memory.store_register is None else drive.profile.address(memory.store_register)
+    return Counter(address for _, address, _ in simulator.drive(1).take_writes() if address != store)
 
 
 def once(drive: Drive, codes: Iterable[str]) -> dict[int, int]:

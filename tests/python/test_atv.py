@@ -18,7 +18,9 @@ from drivebus.cli import cli
 
 from .jobs import asked, carry_out_awaited
 
-CMD, LFR, ETA, FR1 = 8501, 8502, 3201, 8413
+CMD, LFR, ETA, FR1, CMI = 8501, 8502, 3201, 8413, 8504
+STORE = 2
+"""Bit 1 of CMI stores all that was set (p. 20)."""
 
 SHUTDOWN = "01 06 21 35 00 06 13 FA"
 SWITCH_ON = "01 06 21 35 00 07 D2 3A"
@@ -241,7 +243,7 @@ def test_a_whole_job(line: Simulator) -> None:
         for step in program(line, bus.drive(1, "atv312", unverified=True)):
             step()
     assert written(line) == WHOLE
-    assert [(at, word) for _, at, word in line.drive(1).writes() if at not in (CMD, LFR)] == [(FR1, 164)]
+    assert [(at, word) for _, at, word in line.drive(1).writes() if at not in (CMD, LFR)] == [(FR1, 164), (CMI, STORE)]
 
 
 def test_a_whole_job_awaited(line: Simulator) -> None:

@@ -140,6 +140,13 @@ def test_ram_and_eeprom_are_reached_by_the_familys_own_rule(family: dict[str, An
         assert memory is not None
         assert profile.address(table["parameter"], store=False) == ram
         assert (memory["reason"] is not None) == table["needs_unverified"]
+        store = table.get("store")
+        assert (memory["means"] == "store") == (store is not None)
+        if store is not None:
+            assert (profile.address(memory["store_register"]), memory["store_word"]) == (
+                store["address"],
+                store["word"],
+            )
 
 
 @every_family

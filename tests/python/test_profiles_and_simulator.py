@@ -232,6 +232,10 @@ def test_memory_is_reached_where_the_profile_says(bench: Bench) -> None:
         [word] = bench.read(row.address)
         worn = machine.eeprom_writes_of(row.address)
         bench.write(profile.address(row.name, store=True), word)
+        memory = profile.memory()
+        if memory is not None and memory.store_register is not None:
+            assert machine.eeprom_writes_of(row.address) == worn, "it stays in RAM until all is stored"
+            continue
         assert machine.eeprom_writes_of(row.address) == worn + 1, row.name
         try:
             address = profile.address(row.name, store=False)

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use drivebus_drives::{Access, Command, Entry, Kind, MemoryBit, Place};
+use drivebus_drives::{Access, Command, Entry, Kind, Place};
 
 use crate::families::Families;
 use crate::family::Family;
@@ -69,8 +69,8 @@ impl Family {
         let is_parameter = self.row(place).map_or_else(|| self.may_keep_parameter(place), is_written);
         is_parameter
             && self.profile().memory().is_none_or(|memory| {
-                let is_set = place.address & memory.mask() != 0;
-                is_set == (memory.means == MemoryBit::Eeprom)
+                // What stays in RAM is kept by the next word that stores all.
+                memory.store_word().is_some() || memory.keeps(place.address & memory.mask() != 0)
             })
     }
 

@@ -138,7 +138,7 @@ pub use halt::{After, Besides, Halt, LastLook, NotHalted, Order, Tries, Why, hal
 pub use harm::What;
 pub use identify::{Certainty, Identification, Reason, identify};
 pub use look::{Look, Looks};
-pub use parameters::{Beyond, Held, InForce, NotKept, NotPlanned, WhyNotKept, WhyNotPlanned};
+pub use parameters::{Beyond, Held, InForce, NotKept, NotPlanned, WhyNotKept, WhyNotPlanned, WhyNotStored};
 pub use prepare::NotPrepared;
 pub use ready::{Ignores, NotReady};
 pub use record::{Record, Sent};

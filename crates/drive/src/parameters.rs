@@ -6,16 +6,20 @@
 //!
 //! A drive tells the value in force, and not where it is kept. What was written to RAM over this [`Record`](crate::Record)
 //! is taken for not stored, whatever else for stored.
+//!
+//! A family may keep all in RAM until a word stores it: that follows the last value, once, and stores also what somebody else
+//! has set in RAM.
 
 mod bounds;
 mod not_kept;
 mod plan;
 mod runs;
 mod send;
+mod stored;
 
 use drivebus_drives::{Input, Profile, Store};
 
-pub use not_kept::{Beyond, Held, InForce, NotKept, NotPlanned, WhyNotKept, WhyNotPlanned};
+pub use not_kept::{Beyond, Held, InForce, NotKept, NotPlanned, WhyNotKept, WhyNotPlanned, WhyNotStored};
 
 use crate::families::Families;
 use crate::task::{LineError, Mailbox};
@@ -63,7 +67,7 @@ impl Unit {
         for run in runs::runs(unit.profile(), &planned) {
             unit.keep(line, families, run, store, done).await?;
         }
-        Ok(())
+        if store == Store::Eeprom { unit.store_written(line, families, &planned).await } else { Ok(()) }
     }
 }
 

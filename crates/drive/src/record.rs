@@ -71,6 +71,11 @@ impl Record {
         self.kept().in_ram.contains(code)
     }
 
+    /// The codes of all that are in RAM alone.
+    pub fn in_ram(&self) -> Vec<String> {
+        self.kept().in_ram.iter().cloned().collect()
+    }
+
     /// The parameter of this code is about to be written to RAM: the drive may take it although its answer is lost.
     pub fn put_in_ram(&self, code: &str) {
         self.kept().in_ram.insert(code.to_owned());

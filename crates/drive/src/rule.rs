@@ -124,8 +124,8 @@ impl<'p> Rule<'p> {
     /// Whether `entry` may be written to where `store` keeps it. Whether there is an
     /// [address](Profile::write_address) for that is not asked here.
     ///
-    /// Only the address of a parameter says where it is kept. Its plain one does not when it is to be kept for good: it is
-    /// what anybody writes to who knows of no such rule.
+    /// The address of a parameter says where it is kept, or a word that follows. A plain address does not when it is to be kept
+    /// for good, and no word follows: it is what anybody writes to who knows of no such rule.
     ///
     /// # Errors
     ///
@@ -133,10 +133,25 @@ impl<'p> Rule<'p> {
     pub fn kept(&self, entry: &Entry, store: Store) -> Result<(), WhyNot<'p>> {
         let Some(memory) = self.profile.memory() else { return Ok(()) };
         let is_plain = || self.profile.write_address(entry, store).ok() == entry.place();
-        if entry.kind() != Kind::Parameter || store == Store::Eeprom && is_plain() {
+        let by_address = memory.store_word().is_none();
+        if entry.kind() != Kind::Parameter || by_address && store == Store::Eeprom && is_plain() {
             return Ok(());
         }
-        self.proves(memory.verified, &memory.note)
+        self.proves(memory.verified, &memory.note)?;
+        if store == Store::Eeprom { self.stores() } else { Ok(()) }
+    }
+
+    /// Whether the word that stores all that is in RAM may be used.
+    ///
+    /// # Errors
+    ///
+    /// [`WhyNot::NotPrinted`]: which register takes it, or which word that is.
+    pub fn stores(&self) -> Result<(), WhyNot<'p>> {
+        let (memory, word) = (self.profile.memory(), self.profile.store_word());
+        let row = word.and_then(|(word, _)| self.profile.find(&word.register).ok());
+        let Some((memory, row)) = memory.zip(row) else { return Ok(()) };
+        self.proves(memory.verified, &memory.note)?;
+        self.proves(row.verified(), row.note())
     }
 
     /// Whether what a parameter of the drive says of `variant` may be used.

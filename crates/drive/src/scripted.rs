@@ -134,7 +134,9 @@ impl Unit for Keeper {
         self.confirms.pop_front().unwrap_or(Ok(()))?;
         let first = self.family.profile().stored_address(write.place).unwrap_or(write.place.address);
         for (address, word) in (first..).zip(words_of(write)) {
-            self.words.insert(Place { address, ..write.place }, word);
+            let place = Place { address, ..write.place };
+            let stores = self.family.profile().store_word().filter(|(store, at)| (*at, store.word) == (place, word));
+            self.words.insert(place, stores.and_then(|(store, _)| store.idle).unwrap_or(word));
         }
         Ok(())
     }

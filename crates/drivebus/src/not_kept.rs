@@ -27,6 +27,8 @@ impl From<WhyNotKept<Self>> for Error {
                 let has_acted = in_force.is_some() || cause.may_have_acted();
                 (cause, has_acted)
             }
+            // It has the values, whatever came of storing them.
+            WhyNotKept::NotStored { .. } => (Self::of(ErrorKind::Unconfirmed, &message), true),
             why => (Self::not_allowed(why), false),
         };
         let kind = cause.kind();

@@ -90,7 +90,7 @@ pub use parts::called::{Alias, Called};
 pub use parts::command::{Command, CommandCode, Control, ParseCommandError, StartWord, Until};
 pub use parts::fault::{Exception, Fault, Means};
 pub use parts::identification::{Identification, Signature};
-pub use parts::memory::{Memory, MemoryBit};
+pub use parts::memory::{Memory, MemoryBit, StoreWord, ToldBy};
 pub use parts::rules::{Requests, UnitKind};
 pub use parts::serial::SerialDefaults;
 pub use parts::setpoint::{Setpoint, SetpointRole};

@@ -21,7 +21,7 @@ use crate::parts::called::Called;
 use crate::parts::command::{Command, CommandCode, Control, StartWord};
 use crate::parts::fault::{Exception, Fault};
 use crate::parts::identification::{Identification, Signature};
-use crate::parts::memory::{Memory, MemoryBit};
+use crate::parts::memory::{Memory, StoreWord};
 use crate::parts::rules::{Groups, Requests, UnitKind};
 use crate::parts::serial::{SerialDefaults, USUAL_READ_COST};
 use crate::parts::setpoint::{Setpoint, SetpointRole};
@@ -151,6 +151,12 @@ impl Profile {
         self.memory.as_ref()
     }
 
+    /// The word that stores all that was set, and where it goes; `None` where the family has none.
+    pub fn store_word(&self) -> Option<(&StoreWord, Place)> {
+        let word = self.memory.as_ref()?.store_word()?;
+        Some((word, self.entry(&word.register)?.place?))
+    }
+
     /// Every register in address order, then every parameter in address order.
     pub fn entries(&self) -> impl Iterator<Item = &Entry> {
         self.entries.iter()
@@ -201,12 +207,12 @@ impl Profile {
                 Store::Eeprom => Err(AccessError::NotStored { name, label }),
             };
         }
-        match (self.memory.as_ref().map(|memory| (memory.means, memory.mask())), store) {
+        match (&self.memory, store) {
             (None, Store::Ram) => Err(AccessError::NoRam { name, label }),
-            (Some((MemoryBit::Ram, bit)), Store::Ram) | (Some((MemoryBit::Eeprom, bit)), Store::Eeprom) => {
-                Ok(Place { address: plain.address | bit, ..plain })
+            (Some(memory), _) if memory.keeps(true) == (store == Store::Eeprom) => {
+                Ok(Place { address: plain.address | memory.mask(), ..plain })
             }
-            (None | Some((MemoryBit::Ram, _)), Store::Eeprom) | (Some((MemoryBit::Eeprom, _)), Store::Ram) => Ok(plain),
+            _ => Ok(plain),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use drivebus_drive::{
     Beyond, Held, InForce, NotGiven, NotKept, NotPlanned, NotPrepared, NotSetBits, WhyNotKept, WhyNotPlanned,
+    WhyNotStored,
 };
 use drivebus_drives::Value;
 use pyo3::IntoPyObjectExt;
@@ -91,6 +92,23 @@ fn kept_told(py: Python<'_>, why: WhyNotKept<Failed>) -> PyResult<Told> {
             let in_force = in_force.map(|told| in_force_told(py, told)).transpose()?;
             ("not_written", (names, written_told(py, why)?, in_force).into_py_any(py)?)
         }
+        Why::NotStored { why, .. } => ("not_stored", stored_told(py, why)?.into_py_any(py)?),
+        why => return Err(unknown(&why)),
+    })
+}
+
+pub(crate) fn not_stored(py: Python<'_>, why: WhyNotStored<Failed>) -> PyResult<Py<PyAny>> {
+    ("not_stored", stored_told(py, why)?).into_py_any(py)
+}
+
+fn stored_told(py: Python<'_>, why: WhyNotStored<Failed>) -> PyResult<Told> {
+    Ok(match why {
+        WhyNotStored::MayNot(why) => ("may_not", why.into_py_any(py)?),
+        WhyNotStored::Unread(error) => ("unread", raised(py, error)?),
+        WhyNotStored::NotIdle { found, idle, .. } => ("not_idle", (found, idle).into_py_any(py)?),
+        WhyNotStored::NotWritten(why) => ("not_written", written_told(py, why)?.into_py_any(py)?),
+        WhyNotStored::Unseen(error) => ("unseen", raised(py, error)?),
+        WhyNotStored::Late(found) => ("late", found.into_py_any(py)?),
         why => return Err(unknown(&why)),
     })
 }
@@ -101,6 +119,7 @@ fn planned_told(why: WhyNotPlanned) -> PyResult<(&'static str, Option<u16>)> {
         WhyNotPlanned::Unknown(error) => return Err(refuse(error)),
         WhyNotPlanned::ReadOnly => ("read_only", None),
         WhyNotPlanned::Moves => ("moves", None),
+        WhyNotPlanned::Stores => ("stores", None),
         WhyNotPlanned::MayNot(_) => ("may_not", None),
         WhyNotPlanned::OnlyStored => ("only_stored", None),
         WhyNotPlanned::Unfit(error) => return Err(refuse(error)),

@@ -1,8 +1,8 @@
 //! What a profile knows, as Python's dictionaries: one function for each kind of table.
 
 use drivebus_drives::{
-    BitField, Control, Counts, Entry, Fault, Identification, Kind, Memory, MemoryBit, Profile, Quantity, Requests,
-    SerialDefaults, Value, Watchdog,
+    BitField, Control, Counts, Entry, Fault, Identification, Kind, Memory, Profile, Quantity, Requests, SerialDefaults,
+    Value, Watchdog,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat, PyInt, PyTuple};
@@ -105,14 +105,12 @@ pub(crate) fn serial<'py>(py: Python<'py>, serial: &SerialDefaults) -> Table<'py
 
 pub(crate) fn memory<'py>(py: Python<'py>, memory: &Memory) -> Table<'py> {
     let dict = PyDict::new(py);
-    dict.set_item("bit", memory.bit)?;
-    dict.set_item(
-        "means",
-        match memory.means {
-            MemoryBit::Ram => "ram",
-            MemoryBit::Eeprom => "eeprom",
-        },
-    )?;
+    let means = if memory.keeps(true) { "eeprom" } else { "ram" };
+    let store = memory.store_word();
+    dict.set_item("bit", store.is_none().then(|| memory.mask().trailing_zeros()))?;
+    dict.set_item("means", if store.is_some() { "store" } else { means })?;
+    dict.set_item("store_register", store.map(|store| &store.register))?;
+    dict.set_item("store_word", store.map(|store| store.word))?;
     dict.set_item("reason", (!memory.verified).then_some(&memory.note))?;
     dict.set_item("source", &memory.source)?;
     Ok(dict)

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use crate::errors::refuse;
 use crate::given::given;
 use crate::not_done::setting;
-use crate::not_kept::{not_given, not_kept, not_prepared, not_set_bits};
+use crate::not_kept::{not_given, not_kept, not_prepared, not_set_bits, not_stored};
 use crate::task::{Task, is_done, or_why};
 use crate::unit::{Unit, setpoint_of};
 
@@ -57,6 +57,10 @@ impl Values {
             unit.write_values(&line, Families::shipped(), &wanted, store_of(store)).await
         };
         Ok(self.0.task(work, told))
+    }
+
+    fn store(&self) -> Task {
+        self.0.task(async |unit, line| unit.store_all(&line, Families::shipped()).await, or_why(not_stored))
     }
 
     #[pyo3(signature = (setpoint, store, /))]

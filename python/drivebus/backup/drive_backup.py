@@ -105,6 +105,7 @@ async def restore(
             address since the port was opened again. Nothing was written.
         NoAnswer, BadAnswer, PortError: The line failed; the error's note names what was restored before. Say it
             again, and the rest follows.
+        Unconfirmed: The drive has all values, in RAM, and is not known to have stored them.
 
     A refusal of one parameter ends nothing: it stands in the report.
     """

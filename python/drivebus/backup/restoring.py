@@ -19,8 +19,8 @@ from drivebus.backup.reading import Reader
 from drivebus.backup.results import Restoration, Restored
 from drivebus.backup.rules import Rules
 from drivebus.backup.text import worded
-from drivebus.backup.writing import place, write
-from drivebus.errors import LINE_ERRORS, BadArgument, NotAllowed, NotReady, Refused, WrongDrive
+from drivebus.backup.writing import place, store_all, stores_all, write
+from drivebus.errors import LINE_ERRORS, BadArgument, NotAllowed, NotReady, Refused, Unconfirmed, WrongDrive
 from drivebus.operations import kept, state
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile.refusals import means
@@ -59,7 +59,7 @@ class Restore:
         """See `Drive.restore`."""
         try:
             return await self._run(groups=groups, serial=serial, motor=motor, raw=raw, force=force)
-        except (*LINE_ERRORS, KeyboardInterrupt) as error:
+        except (*LINE_ERRORS, Unconfirmed, KeyboardInterrupt) as error:
             if not self._dry_run:
                 self._note(error)
             raise
@@ -87,6 +87,7 @@ class Restore:
         await self._carry_out([code for code in pending if code not in lines], pairs)
         if not self._dry_run:
             await self._look_again()
+            await store_all(self._unit, asked)
         await self._change_line(lines)
         lacking = self._lacking(groups)
         return Restoration([self._item(code) for code in (*chosen, *lacking)], self._order, self._dry_run)
@@ -148,7 +149,7 @@ class Restore:
                 is_there = why.why != "not there"
                 self._results[code] = ("unread", f"not written, {why.why}: {why}") if is_there else ("missing", why)
             elif words.raw[code] == self._backup.raw[code] and (
-                self._to_ram(code) or not kept.is_in_ram(self._unit, code)
+                self._to_ram(code) or stores_all(self._unit) or not kept.is_in_ram(self._unit, code)
             ):
                 self._results[code] = ("same", "")
 
@@ -286,6 +287,8 @@ class Restore:
                     "differs",
                     "it was written, and the drive was not heard since: it may obey its new line already",
                 )
+        if codes and gone is None and not self._dry_run:
+            await store_all(self._unit, codes)
 
     async def _write(self, code: str, raw: int, *, store: bool = True, final: bool = True) -> int:
         """Writes one parameter, or says that it would, and notes what came of it."""

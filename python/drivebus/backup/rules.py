@@ -21,7 +21,9 @@ class Rules:
         self.profile = profile
         self._serial = frozenset(profile.serial_parameters())
         self._motor = frozenset(profile.motor_parameters())
-        self._acts = frozenset(profile.acts())
+        memory = profile.memory()
+        stores = [] if memory is None or memory.store_register is None else [memory.store_register]
+        self._acts = frozenset((*profile.acts(), *stores))
         self._faults = frozenset((*profile.fault_history, *profile.fault_values))
 
     def codes(self) -> list[str]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from drivebus import _native
 from drivebus.errors import LINE_ERRORS, Refused, Unverified
-from drivebus.operations import kept, raw_words
+from drivebus.operations import kept, not_kept, raw_words
+from drivebus.operations.core_calls import call_core
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile.refusals import means
 
-__all__ = ["place", "write"]
+__all__ = ["place", "store_all", "stores_all", "write"]
 
 _ATTEMPTS = 3
 """How often a write is sent that the drive shows not to have heard."""
@@ -66,8 +70,30 @@ async def _look(unit: DriveView, code: str) -> int:
 async def _put(unit: DriveView, code: str, address: int, word: int, *, store: bool) -> None:
     """Writes the word of a parameter, and remembers to which memory."""
     known = unit.profile.describe(code)
-    if not store:
+    is_kept = store and not stores_all(unit)
+    if not is_kept:
         kept.put_in_ram(unit, known)
     await raw_words.write(unit, address, word)
-    if store:
+    if is_kept:
         kept.stored(unit, known)
+
+
+def stores_all(unit: DriveView) -> bool:
+    """Whether all stays in RAM until a word stores it."""
+    memory = unit.profile.memory()
+    return memory is not None and memory.means == "store"
+
+
+async def store_all(unit: DriveView, codes: Iterable[str]) -> None:
+    """Has the drive store all that it has in RAM, where it needs to be told, and where *codes* may be stored.
+
+    What an earlier restore wrote that was cut off is told by nothing: so this is done also where nothing was written.
+
+    Raises:
+        Unconfirmed: It has all values, and is not known to have stored them.
+    """
+    if not stores_all(unit) or all(unit.evidence.unkept(code, store=True) is not None for code in codes):
+        return
+    kind, told = await call_core(unit, lambda core: _native.Values(core).store())
+    if kind != "done":
+        raise not_kept.not_stored(unit, *told)

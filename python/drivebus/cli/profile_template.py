@@ -77,6 +77,8 @@ source = "Not read yet: the rule of most drives with codes such as P05.06"
 # [parameters.memory]
 # bit = 15               # of the address
 # means = "ram"          # set, the write goes to RAM only; "eeprom": set, it is kept
+# Instead, where all stays in RAM until a word stores it:
+# store = {{ register = "…", word = 1, idle = 0 }}  # idle: what stands there before, and when it is through
 # verified = true
 # source = "…, p. …"
 

@@ -7,13 +7,13 @@ from typing import Any
 
 from drivebus import checks
 from drivebus.advice import Advice, Text, argument, call, joined
-from drivebus.errors import BadArgument, DrivebusError, NotReady
+from drivebus.errors import BadArgument, DrivebusError, NotReady, Unconfirmed
 from drivebus.operations import not_written, unit_variants
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile.evidence import refusal_of
 from drivebus.values import State
 
-__all__ = ["in_words", "written_before"]
+__all__ = ["in_words", "not_stored", "written_before"]
 
 
 def in_words(unit: DriveView, kind: str, told: Any, *, store: bool = False, given: Any = None) -> DrivebusError:
@@ -55,8 +55,40 @@ def in_words(unit: DriveView, kind: str, told: Any, *, store: bool = False, give
         if in_force is not None:
             _add_note(error, _in_force(names, *in_force))
         return error
+    if kind == "not_stored":
+        return not_stored(unit, *told)
     failed: DrivebusError = told
     return failed
+
+
+def not_stored(unit: DriveView, kind: str, told: Any) -> Unconfirmed:
+    """Why *unit*, which has all values in RAM, is not known to have stored them: *kind* and *told*."""
+    memory = unit.profile.memory()
+    register = None if memory is None else memory.store_register
+    cause: DrivebusError | None = None
+    if kind == "may_not":
+        why = f"it was not told to: {told}"
+    elif kind == "not_idle":
+        found, idle = told
+        why = (
+            f"it was not told to: {register} is {found:04X}H, and only at {idle:04X}H does storing change nothing else"
+        )
+    elif kind == "late":
+        why = f"it took the word for {register}, which is at {told:04X}H and should be back where it was"
+    elif kind == "not_written":
+        cause = not_written.in_words(unit, *told)
+        why = f"the word for {register}: {cause}"
+    else:
+        cause = told
+        was_told = "it was not told to" if kind == "unread" else "it was told to"
+        why = f"{was_told}, and {register} could not be read: {cause}"
+    error = Unconfirmed(
+        f"unit {unit.address} has all values, in RAM, and is not known to have stored them: {why}. What is not stored "
+        "is lost with the power",
+        unit=unit.address,
+    )
+    error.__cause__ = cause
+    return error
 
 
 def written_before(error: DrivebusError, done: Sequence[str]) -> DrivebusError:
@@ -82,6 +114,15 @@ def _not_planned(unit: DriveView, name: str, kind: str, word: int | None, *, sto
                 f"{name} ({known.label}) can move the motor, so write() refuses it; use ",
                 joined(map(call, ("run", "stop", "coast", "jog", "reset_fault")), ", ", " or "),
                 Advice("own_methods", None, ", or for terminals and the special control word their own methods"),
+            ),
+            unit=unit.address,
+        )
+    if kind == "stores":
+        return BadArgument(
+            Text(
+                f"{name} ({known.label}) stores all that was set; nothing was sent to unit {unit.address}. It is "
+                "written after values that are written with ",
+                argument("store", True),
             ),
             unit=unit.address,
         )

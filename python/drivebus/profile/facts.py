@@ -119,14 +119,19 @@ class Memory(_Fact):
     """Where a parameter that is written is kept.
 
     Attributes:
-        bit: The bit of the address that decides it, 0..15.
-        means: What a write with that bit reaches: `"ram"`, only that; `"eeprom"`, that too.
+        bit: The bit of the address that decides it, 0..15; None where a word stores what was written.
+        means: What a write with that bit reaches: `"ram"`, only that; `"eeprom"`, that too. `"store"`: what is written
+            stays in RAM until *store_word*, written to *store_register*, stores all that was set, by whomever.
+        store_register: Where that word goes; None where a bit decides.
+        store_word: The word; None where a bit decides.
         reason: Why this is not verified; None where it is.
         source: The document that says so.
     """
 
-    bit: int
+    bit: int | None
     means: str
+    store_register: str | None
+    store_word: int | None
     reason: str | None
     source: str
 

@@ -31,7 +31,7 @@ fn before(done: &[String]) -> String {
 
 /// Why values are not known to be kept. `E` is the error of whoever drives.
 ///
-/// But for [`Failed`](Self::Failed) and [`NotWritten`](Self::NotWritten), nothing was written.
+/// But for [`Failed`](Self::Failed), [`NotWritten`](Self::NotWritten) and [`NotStored`](Self::NotStored), nothing was written.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum WhyNotKept<E> {
@@ -83,6 +83,63 @@ pub enum WhyNotKept<E> {
         /// What the drive has now, where several shared a request that it refused: it may have taken some of them.
         in_force: Option<InForce<E>>,
     },
+    /// The unit has all values, in RAM, and is not known to have stored them.
+    #[error("all values are set in RAM, and are not known to be stored by {register}: {why}")]
+    NotStored {
+        /// What stores them.
+        register: String,
+        /// And why that came to nothing.
+        why: WhyNotStored<E>,
+    },
+}
+
+/// Why a unit is not known to have stored what was set in RAM. `E` is the error of whoever drives.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WhyNotStored<E> {
+    /// How the family stores may not be used; with the reason. It was not told to store.
+    #[error("it was not told to: {0}")]
+    MayNot(String),
+    /// What stands in the register could not be read. It was not told to store.
+    #[error("it was not told to, for the register could not be read: {0}")]
+    Unread(E),
+    /// Something else stands in the register, which the word would undo. It was not told to store.
+    #[error("it was not told to, for {found:04X}H stands there and not {idle:04X}H")]
+    NotIdle {
+        /// What stands there.
+        found: u16,
+        /// What should.
+        idle: u16,
+    },
+    /// It is not known to have taken the word.
+    #[error("{0}")]
+    NotWritten(NotWritten<E>),
+    /// It took the word; whether it is through could not be read.
+    #[error("it took the word, and whether it is through could not be read: {0}")]
+    Unseen(E),
+    /// It took the word, and does not show that it is through: this still stands there.
+    #[error("it took the word, and {0:04X}H still stands there")]
+    Late(u16),
+}
+
+impl<E: LineError> WhyNotStored<E> {
+    /// What went wrong.
+    pub fn cause(&self) -> Cause {
+        match self {
+            Self::Unread(error) | Self::Unseen(error) => error.cause(),
+            Self::NotWritten(why) => why.cause(),
+            Self::MayNot(_) | Self::NotIdle { .. } | Self::Late(_) => Cause::Other,
+        }
+    }
+
+    /// Whether the word went out: the unit may have stored all then, unless it refused.
+    pub fn was_sent(&self) -> bool {
+        match self {
+            Self::MayNot(_) | Self::Unread(_) | Self::NotIdle { .. } => false,
+            Self::NotWritten(why) => why.was_sent(),
+            Self::Unseen(_) | Self::Late(_) => true,
+        }
+    }
 }
 
 fn shared<E: fmt::Display>(in_force: Option<&InForce<E>>) -> String {
@@ -95,13 +152,18 @@ impl<E: LineError> WhyNotKept<E> {
         match self {
             Self::NotSettled(NotSettled::Failed(error)) | Self::Failed(error) => error.cause(),
             Self::NotWritten { why, .. } => why.cause(),
+            Self::NotStored { why, .. } => why.cause(),
             _ => Cause::Other,
         }
     }
 
     /// Whether the write that failed went out: the unit may have taken it then, unless it was refused.
     pub fn was_sent(&self) -> bool {
-        matches!(self, Self::NotWritten { why, .. } if why.was_sent())
+        match self {
+            Self::NotWritten { why, .. } => why.was_sent(),
+            Self::NotStored { why, .. } => why.was_sent(),
+            _ => false,
+        }
     }
 }
 
@@ -194,6 +256,9 @@ pub enum WhyNotPlanned {
     /// It can move the motor, and is no value.
     #[error("it can move the motor, and is written as a command alone")]
     Moves,
+    /// It stores all that was set, and is no value.
+    #[error("it stores all that was set, and is written behind what is to be stored")]
+    Stores,
     /// It may not be written; with the reason.
     #[error("it may not be written: {0}")]
     MayNot(String),

@@ -63,6 +63,9 @@ impl Unit {
         if entry.place().is_some_and(|place| profile.is_command(place)) {
             return Err(Why::Moves);
         }
+        if entry.place().is_some() && profile.store_word().map(|(_, at)| at) == entry.place() {
+            return Err(Why::Stores);
+        }
         rule.write(entry).map_err(|why| Why::MayNot(why.to_string()))?;
         if entry.kind() == Kind::Parameter && store == Store::Ram && profile.memory().is_none() {
             return Err(Why::OnlyStored);

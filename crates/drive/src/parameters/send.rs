@@ -29,11 +29,13 @@ impl Unit {
             }
             return self.send_run(line, families, run, true, done).await;
         }
+        // What stays in RAM until all is stored needs no more than to be there.
+        let stays = self.profile().store_word().is_some();
         // What is read is what is in force. It tells about EEPROM only if RAM was not written since.
         let words = self.words_of(line, run).await.map_err(Why::Failed)?;
         let (mut from, mut is_told) = (0, true);
         for (at, (item, word)) in run.iter().zip(words).enumerate() {
-            if word == item.word && !self.record().is_in_ram(item.key()) {
+            if word == item.word && (stays || !self.record().is_in_ram(item.key())) {
                 self.store(line, families, &run[from..at], is_told, done).await?;
                 done.push(item.name.to_owned());
                 (from, is_told) = (at + 1, true);
@@ -57,15 +59,25 @@ impl Unit {
         if run.is_empty() {
             return Ok(());
         }
+        if self.profile().store_word().is_some() {
+            for item in run {
+                self.record().put_in_ram(item.key());
+            }
+            return self.send_run(line, families, run, is_told, done).await;
+        }
         self.send_run(line, families, run, is_told, done).await?;
         for item in run {
-            let times = self.record().stored(item.key());
-            if times >= Record::STORES_BEFORE_NOTICE {
-                let name = item.key().to_owned();
-                line.taken_for(self.address(), self.family()).tell(Notice::Stored { name, times }).await;
-            }
+            self.note_stored(line, item.key()).await;
         }
         Ok(())
+    }
+
+    pub(super) async fn note_stored<E: LineError>(&self, line: &Mailbox<E>, key: &str) {
+        let times = self.record().stored(key);
+        if times >= Record::STORES_BEFORE_NOTICE {
+            let name = key.to_owned();
+            line.taken_for(self.address(), self.family()).tell(Notice::Stored { name, times }).await;
+        }
     }
 
     /// Sends `run` by one request, whose confirmation is looked for by reading where that `is_told` by it.

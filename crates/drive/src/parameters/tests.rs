@@ -12,6 +12,7 @@ use crate::task::{Cause, Notice};
 use crate::writing::NotWritten;
 
 mod any;
+mod stored;
 
 /// What a Goodrive350 says of itself, and of its motor: that it stands.
 const GD350: [(u16, u16); 2] = [(0x2103, 0x01A0), (0x2100, 3)];
@@ -196,9 +197,9 @@ fn what_the_profile_does_not_allow_is_not_asked_for() {
     let mut gd10 = Bench::of("gd10", &[]);
     let unverified = gd10.not_planned(&[("P00.01", Input::Integer(2))], Store::Ram);
     assert!(matches!(unverified, WhyNotPlanned::MayNot(_) | WhyNotPlanned::MayNotKeep(_)), "{unverified}");
-    // Altivar 312: each write counts as kept.
-    let mut atv312 = Bench::of("atv312", &[]);
-    assert_eq!(atv312.not_planned(&[("ttO", Input::Float(1.0))], Store::Ram), WhyNotPlanned::OnlyStored);
+    // V20: each write counts as kept.
+    let mut v20 = Bench::of("v20", &[]);
+    assert_eq!(v20.not_planned(&[("P1120", Input::Float(1.0))], Store::Ram), WhyNotPlanned::OnlyStored);
 }
 
 /// One that is not allowed keeps all others back, in whatever order they stand.

@@ -82,7 +82,8 @@ fn what_is_set_by_hand_is_left_to_who_writes_it() {
             assert_eq!(bench.script.sent, []);
         } else {
             done.unwrap();
-            assert_eq!(bench.script.sent.len(), 1);
+            // Fr1 = 164, and bit 1 of CMI, which stores it (p. 20).
+            assert_eq!(bench.script.written(), [(0x20DD, vec![164]), (0x2138, vec![2])]);
         }
     }
 }

@@ -11,9 +11,10 @@ use super::motion;
 use super::placed::Placed;
 use super::problems::Problems;
 use super::{File, inherit, rows, sense, sequence, succeed};
-use crate::entry::Entry;
+use crate::entry::{Access, Entry};
 use crate::parts::rules::{Groups, Requests, UnitKind};
 use crate::parts::setpoint::{Setpoint, SetpointRole};
+use crate::place::Table;
 use crate::profile::Profile;
 use crate::profile::roles::Roles;
 use crate::text::closest;
@@ -38,6 +39,7 @@ pub(super) fn profile(
     }
     let mut entries = entries(files, manifest, &mut profile, problems);
     bits(file, manifest, &mut entries, problems);
+    memory(file, manifest, &entries, problems);
 
     if let Some(parameters) = &manifest.parameters {
         let groups = &mut profile.groups;
@@ -234,6 +236,21 @@ fn entries(files: &Files, manifest: &Manifest, profile: &mut Profile, problems: 
         check_variants(file, &wanted, manifest, profile, problems);
     }
     entries
+}
+
+/// Checks the register that takes the word which stores parameters.
+fn memory(file: &File, manifest: &Manifest, entries: &Entries, problems: &mut Problems) {
+    let rule = manifest.parameters.as_ref().and_then(|parameters| parameters.memory.as_ref());
+    let Some(store) = rule.and_then(|rule| rule.get_ref().store.as_ref()) else { return };
+    let Some(entry) = entries.get(file, &store.register, problems) else { return };
+    let is_seen = store.idle.is_none() || entry.access != Access::Wo;
+    if entry.words() != 1 || entry.place.is_none_or(|place| place.table != Table::Holding) || !is_seen {
+        let reason = format!(
+            "{} is to store parameters, so it must be one word among the holding registers, and with \"idle\" one that can be read",
+            entry.name
+        );
+        problems.add(file, line(file, &store.register), reason);
+    }
 }
 
 fn bits(file: &File, manifest: &Manifest, entries: &mut Entries, problems: &mut Problems) {

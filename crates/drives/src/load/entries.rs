@@ -169,8 +169,8 @@ fn out_of_place(entry: &Entry, closed_groups: &[u8], memory: Option<&Memory>) ->
         return Some(format!("{} is in the group {group}, which is one of \"closed_groups\"", entry.name));
     }
     let mask = memory.map_or(0, Memory::mask);
-    let bit = memory.map_or(0, |memory| memory.bit);
     (address & mask != 0).then(|| {
+        let bit = mask.trailing_zeros();
         format!(
             "{} is at {address:04X}H, whose bit {bit} says where a write is kept: give the plain address",
             entry.name

@@ -14,7 +14,7 @@ use crate::parts::called::{Alias, Called};
 use crate::parts::command::Control;
 use crate::parts::fault::{Exception, Means};
 use crate::parts::identification::{Identification, Signature};
-use crate::parts::memory::Memory;
+use crate::parts::memory::{Memory, StoreWord, ToldBy};
 use crate::parts::serial::SerialDefaults;
 use crate::parts::variant::{Share, Variant, VariantChoice};
 use crate::parts::watchdog::Watchdog;
@@ -72,13 +72,17 @@ pub(super) fn memory(file: &File, spanned: &Placed<manifest::Memory>) -> Result<
             file.broken(line(file, spanned), "a memory rule that is not verified needs a \"note\" that says why")
         );
     }
-    Ok(Memory {
-        bit: within(file, &row.bit, 8, 15, "bit")?,
-        means: row.means,
-        verified: row.verified,
-        note: row.note.clone(),
-        source: row.source.clone(),
-    })
+    let told_by = match (&row.bit, row.means, &row.store) {
+        (Some(bit), Some(means), None) => ToldBy::Bit { bit: within(file, bit, 8, 15, "bit")?, means },
+        (None, None, Some(store)) => {
+            ToldBy::Word(StoreWord { register: store.register.get_ref().clone(), word: store.word, idle: store.idle })
+        }
+        _ => {
+            let reason = "a memory rule has either \"bit\" and \"means\", or \"store\"";
+            return Err(file.broken(line(file, spanned), reason));
+        }
+    };
+    Ok(Memory { told_by, verified: row.verified, note: row.note.clone(), source: row.source.clone() })
 }
 
 pub(super) fn identifications(

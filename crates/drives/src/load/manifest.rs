@@ -202,9 +202,11 @@ pub(super) struct Parameters {
 #[serde(deny_unknown_fields)]
 pub(super) struct Memory {
     /// The bit of the address, 8 to 15.
-    pub(super) bit: Placed<u8>,
+    pub(super) bit: Option<Placed<u8>>,
     /// What it means when it is set.
-    pub(super) means: MemoryBit,
+    pub(super) means: Option<MemoryBit>,
+    /// Instead of a bit: the word that stores what was written, which stays in RAM until then.
+    pub(super) store: Option<StoreWord>,
     /// Whether a document of this very family prints it.
     pub(super) verified: bool,
     /// What to know about it; where it is not verified, why.
@@ -212,6 +214,19 @@ pub(super) struct Memory {
     pub(super) note: String,
     /// Where it is printed: document and page.
     pub(super) source: String,
+}
+
+/// The word that stores all that was set.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(super) struct StoreWord {
+    /// The register, or parameter, that takes it.
+    pub(super) register: Placed<String>,
+    /// What is written there.
+    pub(super) word: u16,
+    /// What stands there before, and again once all is stored. Where something else stands, nothing is stored.
+    pub(super) idle: Option<u16>,
 }
 
 /// What the drive says it is.

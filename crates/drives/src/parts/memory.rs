@@ -1,4 +1,4 @@
-//! Memory: which address of a parameter reaches EEPROM, and which only RAM. Families have opposite rules.
+//! Memory: what of a parameter reaches EEPROM, and what only RAM. Families have opposite rules.
 
 /// What the memory bit of a parameter's address means when it is set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Deserialize)]
@@ -15,10 +15,8 @@ pub enum MemoryBit {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Memory {
-    /// The bit of the address, 8..=15.
-    pub bit: u8,
-    /// What it means.
-    pub means: MemoryBit,
+    /// By what it says so.
+    pub told_by: ToldBy,
     /// Whether a document of this family prints it.
     pub verified: bool,
     /// What to know about it; says what is assumed where it is not verified.
@@ -27,9 +25,56 @@ pub struct Memory {
     pub source: String,
 }
 
+/// What decides where a written parameter is kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ToldBy {
+    /// A bit of its address.
+    Bit {
+        /// Which one, 8..=15.
+        bit: u8,
+        /// What it means.
+        means: MemoryBit,
+    },
+    /// A word written after it. Without that, it stays in RAM.
+    Word(StoreWord),
+}
+
+/// The word that stores all that was set, also what somebody else had set in RAM.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct StoreWord {
+    /// The name of the register that takes it.
+    pub register: String,
+    /// What is written there.
+    pub word: u16,
+    /// What stands there before, and again once all is stored; `None` where that does not tell. Where something else stands
+    /// there, the word would undo it.
+    pub idle: Option<u16>,
+}
+
 impl Memory {
-    /// The bit as a mask.
+    /// The bit of a parameter's address that decides, as a mask; 0 where none does.
     pub const fn mask(&self) -> u16 {
-        1 << self.bit
+        match self.told_by {
+            ToldBy::Bit { bit, .. } => 1 << bit,
+            ToldBy::Word(_) => 0,
+        }
+    }
+
+    /// Whether a write to an address that has the bit set, or has not, is kept in EEPROM by itself.
+    pub fn keeps(&self, is_set: bool) -> bool {
+        match self.told_by {
+            ToldBy::Bit { means, .. } => is_set == (means == MemoryBit::Eeprom),
+            ToldBy::Word(_) => false,
+        }
+    }
+
+    /// The word that stores what was written, where the family has one.
+    pub const fn store_word(&self) -> Option<&StoreWord> {
+        match &self.told_by {
+            ToldBy::Bit { .. } => None,
+            ToldBy::Word(word) => Some(word),
+        }
     }
 }

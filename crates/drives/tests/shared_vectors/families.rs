@@ -88,7 +88,17 @@ struct Memory {
     parameter: String,
     ram: Word,
     eeprom: Word,
+    store: Option<StoreWord>,
     needs_unverified: bool,
+}
+
+/// The word that stores what was written.
+#[derive(Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoreWord {
+    address: u32,
+    word: u16,
+    idle: Option<u16>,
 }
 
 #[derive(Deserialize)]
@@ -228,6 +238,10 @@ fn every_family_reaches_ram_and_eeprom_by_its_own_rule() {
         let in_doubt = profile.memory().is_some_and(|memory| !memory.verified);
         assert_eq!(in_doubt, table.needs_unverified, "{}", family.name);
         assert_eq!(profile.memory().is_some(), table.ram.get().is_some(), "{}", family.name);
+        let told = profile.store_word();
+        let store =
+            told.map(|(store, place)| StoreWord { address: place.number(), word: store.word, idle: store.idle });
+        assert_eq!(store, table.store, "{}", family.name);
     }
 }
 

@@ -207,7 +207,8 @@ impl Drive {
             (Word::Register(_), _, true) => Some(Target::Control),
             (Word::Register(_), _, false) | (Word::Parameter(_), Memory::EepromOnly, false) => None,
             (Word::Parameter(_), Memory::BitMeansRam(_), false)
-            | (Word::Parameter(_), Memory::BitMeansEeprom(_), true) => Some(Target::Ram),
+            | (Word::Parameter(_), Memory::BitMeansEeprom(_), true)
+            | (Word::Parameter(_), Memory::RamUntil(..), _) => Some(Target::Ram),
             (Word::Parameter(_), _, _) => Some(Target::Eeprom),
         }
     }
@@ -274,6 +275,11 @@ impl Drive {
             return;
         }
         let before = self.control_word(address);
+        let stores = match self.family().memory {
+            Memory::RamUntil(at, bits) if at == address => word & bits,
+            _ => 0,
+        };
+        let word = word & !stores;
         match self.target(address) {
             Some(Target::Control) => {
                 if let Some(control) = self.map.control(address).and_then(|place| self.control.get_mut(place)) {
@@ -283,6 +289,9 @@ impl Drive {
             Some(Target::Eeprom) => self.store.write_eeprom(plain, word),
             Some(Target::Ram) => self.store.write_ram(plain, word),
             None => {}
+        }
+        if stores != 0 {
+            self.store.keep_all();
         }
         if self.is_password(address) {
             self.unlocked = false;

@@ -113,6 +113,8 @@ pub(crate) enum Memory {
     BitMeansEeprom(u16),
     /// Every write is kept in EEPROM; there is no address with such a bit.
     EepromOnly,
+    /// Every write goes to RAM, until the word at this address has one of these bits: that stores all, and the bits go back to 0.
+    RamUntil(u32, u16),
 }
 
 /// The bit that families typed here have for the other memory.
@@ -123,7 +125,7 @@ impl Memory {
     pub(crate) fn mask(self) -> u16 {
         match self {
             Self::BitMeansRam(bit) | Self::BitMeansEeprom(bit) => bit,
-            Self::EepromOnly => 0,
+            Self::EepromOnly | Self::RamUntil(..) => 0,
         }
     }
 }

@@ -46,6 +46,18 @@ impl Store {
         }
     }
 
+    /// From the bus: all that RAM has is kept for good.
+    ///
+    /// Assumption: what EEPROM has already is not written again.
+    pub(crate) fn keep_all(&mut self) {
+        let places = Arc::clone(&self.places);
+        for (address, place) in (0..=u16::MAX).filter_map(|address| Some((address, places.of(address.into())?))) {
+            if let Some(word) = self.ram.get(place).copied().filter(|word| self.eeprom.get(place) != Some(word)) {
+                self.write_eeprom(address, word);
+            }
+        }
+    }
+
     /// The drive itself keeps `word` for good.
     pub(crate) fn keep(&mut self, address: u16, word: u16) {
         self.write_ram(address, word);

@@ -196,11 +196,19 @@ def memory(profile: drivebus.Profile) -> list[str]:
     rule = profile.memory()
     if rule is None:
         return ["no write to RAM alone is known: every write of a parameter may wear EEPROM, and needs --store"]
-    ram = "RAM only, without it EEPROM too" if rule.means == "ram" else "EEPROM too, without it RAM only"
-    lines = [f"a parameter written with bit {rule.bit} of its address set goes to {ram}"]
+    if rule.means == "store":
+        told = f"{rule.store_word:04X}H to {rule.store_register}"
+        lines = [f"parameters stay in RAM; --store writes {told}, which keeps all of them"]
+    else:
+        lines = [_by_bit(rule)]
     if rule.reason is not None:
         lines.append(f"not usable without --unverified: {rule.reason}")
     return lines
+
+
+def _by_bit(rule: Any) -> str:
+    ram = "RAM only, without it EEPROM too" if rule.means == "ram" else "EEPROM too, without it RAM only"
+    return f"a parameter written with bit {rule.bit} of its address set goes to {ram}"
 
 
 def _needs(rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use drivebus_drives::{Access, Entry, Kind, MemoryBit};
+use drivebus_drives::{Access, Entry, Kind};
 use drivebus_rtu::Instant;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -139,7 +139,8 @@ fn carried_out(case: &Case) -> Came {
 
 fn holds(case: &Case, outcome: &Came) {
     let profile = case.unit.family.profile();
-    for &(place, word) in &outcome.words {
+    let store = profile.store_word().map(|(store, place)| (place, store.word));
+    for &(place, word) in outcome.words.iter().filter(|&&sent| Some(sent) != store) {
         let entry = profile.written_entry_at(place).unwrap();
         assert!(!profile.is_command(place), "{} can move the motor", entry.name());
         assert!(entry.access() != Access::Ro, "{} can only be read", entry.name());
@@ -155,14 +156,20 @@ fn holds(case: &Case, outcome: &Came) {
         });
         assert!(is_within, "{} = {word}", entry.name());
     }
-    for (_, write) in &outcome.script.sent {
+    let stores =
+        |write: &Write| store.is_some_and(|(place, word)| (write.place, words_of(write)) == (place, vec![word]));
+    let first = outcome.script.sent.iter().position(|(_, write)| stores(write)).unwrap_or(outcome.script.sent.len());
+    let (before, after) = outcome.script.sent.split_at(first);
+    assert!(after.is_empty() || case.store == Store::Eeprom, "it is stored unasked");
+    assert!(after.iter().all(|(_, write)| stores(write)) && after.len() <= 5, "it is stored last");
+    for (_, write) in before {
         let plain = profile.stored_address(write.place).map_or(write.place, Place::from);
         let entry = profile.written_entry_at(plain).unwrap();
         if entry.kind() == Kind::Parameter {
             // Bit 15 of a VFD500 means that it is kept, and that of an INVT that it is not.
             let has_bit = plain != write.place;
-            let is_kept = profile.memory().is_none_or(|memory| has_bit == (memory.means == MemoryBit::Eeprom));
-            assert_eq!(is_kept, case.store == Store::Eeprom, "{} at {}", entry.name(), write.place);
+            let is_kept = profile.memory().is_none_or(|memory| memory.keeps(has_bit));
+            assert_eq!(is_kept, case.store == Store::Eeprom && store.is_none(), "{} at {}", entry.name(), write.place);
         } else {
             assert_eq!((case.store, write.place), (Store::Ram, plain));
         }

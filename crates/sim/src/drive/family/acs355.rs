@@ -20,6 +20,8 @@ use crate::drive::refusal::by_the_specification;
 const COMMAND_SOURCE: u16 = 1000;
 const SETPOINT_SOURCE: u16 = 1102;
 const REFERENCE: u16 = 1104;
+/// 1607: 1 stores all that was set, and goes back to 0.
+const SAVE: u32 = 1606;
 const PROFILE: u16 = 5304;
 
 pub(crate) fn acs355() -> Family {
@@ -30,7 +32,7 @@ pub(crate) fn acs355() -> Family {
         max_words: MAX_WORDS,
         across_groups: true,
         exception: by_the_specification,
-        memory: Memory::EepromOnly,
+        memory: Memory::RamUntil(SAVE, 1),
         identification: 0,
         command: Some(0),
         commands: COMMANDS.to_vec(),
@@ -85,6 +87,7 @@ const REGISTERS: &[Register] = &[
 const PARAMETERS: &[Parameter] = &[
     Parameter::new(COMMAND_SOURCE, 0, 20, 2).at_standstill(),
     Parameter::new(SETPOINT_SOURCE, 0, 20, 1).at_standstill(),
+    Parameter::new(1606, 0, 1, 0),
     Parameter::new(REFERENCE, 0, 5_999, 500),
     Parameter::new(PROFILE, 0, 2, 2),
 ];

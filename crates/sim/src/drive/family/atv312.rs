@@ -7,6 +7,7 @@
 //! - Assumption: somebody has set LAC to L3 at its keypad, and SLL to 0, so that a silent bus does nothing; from the factory they are
 //!   0 (L1) and 1. What L1 and L2 change is not done here.
 //! - Assumption: 80H resets a fault, whatever the word before it. A fault and its reset lead back to the beginning.
+//! - Assumption: bits of CMI other than 1 do nothing. What is stored is there at once, in any state of the motor.
 //! - Assumption: CMD takes these words only, and 02H (quick stop) is none of them. Other words are out of range.
 //! - Assumption: it obeys the bus while Fr1 is 164, and is at AI1 from the factory: the setpoint is then that of the keypad.
 //! - Assumption: 50.0 Hz is the frequency in FrS, HSP and at the keypad.
@@ -19,6 +20,8 @@ use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::by_the_specification;
 
 const COMMAND: u32 = 8501;
+/// CMI: bit 1 stores all that was set in EEPROM, and goes back to 0 (p. 20).
+const EXTENDED_COMMAND: u32 = 8504;
 const MAX_FREQUENCY: u16 = 3103;
 const HIGH_SPEED: u16 = 3104;
 const SETPOINT_SOURCE: u16 = 8413;
@@ -38,7 +41,7 @@ pub(crate) fn atv312() -> Family {
         max_words: 29,
         across_groups: true,
         exception: by_the_specification,
-        memory: Memory::EepromOnly,
+        memory: Memory::RamUntil(EXTENDED_COMMAND, 0x0002),
         identification: 0,
         command: Some(COMMAND),
         commands: COMMANDS.to_vec(),
@@ -96,7 +99,7 @@ const REGISTERS: &[Register] = &[
     Register::read(7121, Shows::Zero),
     Register::set(8501, Range::Words(0, u16::MAX)),
     Register::set(8502, Range::Speed),
-    Register::read(8504, Shows::Zero),
+    Register::set(EXTENDED_COMMAND, Range::Words(0, u16::MAX)),
     Register::read(8606, Shows::Fault),
     Register::read(9630, Shows::Zero),
 ];

@@ -13,8 +13,8 @@
 use std::borrow::Cow;
 
 use drivebus_drives::{
-    Access as ProfileAccess, BitField, Command as Told, Control, Entry, Kind as EntryKind, MemoryBit, Place, Profile,
-    Quantity, Setpoint, State, Table, UnitKind, Value,
+    Access as ProfileAccess, BitField, Command as Told, Control, Entry, Kind as EntryKind, Place, Profile, Quantity,
+    Setpoint, State, Table, UnitKind, Value,
 };
 
 use super::{
@@ -75,11 +75,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         max_words: profile.max_words(),
         across_groups: profile.requests().across_groups,
         exception: by_the_specification,
-        memory: match profile.memory() {
-            Some(memory) if memory.means == MemoryBit::Ram => Memory::BitMeansRam(memory.mask()),
-            Some(memory) => Memory::BitMeansEeprom(memory.mask()),
-            None => Memory::EepromOnly,
-        },
+        memory: own.memory(),
         identification: own.identification(),
         command: profile.command_address().map(Place::number),
         commands,
@@ -278,6 +274,15 @@ impl Own<'_> {
     fn highest_hertz(&self) -> Option<f64> {
         let quantity = self.profile.role("setpoints.frequency")?.quantity();
         quantity.high().filter(|_| quantity.unit() == "Hz").map(Value::to_f64)
+    }
+
+    fn memory(&self) -> Memory {
+        let Some(memory) = self.profile.memory() else { return Memory::EepromOnly };
+        match (self.profile.store_word(), memory.keeps(true)) {
+            (Some((store, place)), _) => Memory::RamUntil(place.number(), store.word),
+            (None, false) => Memory::BitMeansRam(memory.mask()),
+            (None, true) => Memory::BitMeansEeprom(memory.mask()),
+        }
     }
 
     /// The code of its own family, or of the one that it reports as.
