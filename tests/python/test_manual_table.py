@@ -153,6 +153,79 @@ def test_names_that_are_alike_are_numbered_in_their_order() -> None:
     )
 
 
+PARAMETERS = """\
+No.  Address  Parameter name        Setting range                              Default  Unit
+P00.01  0001H  Run command source   0: keypad; 1: terminals; 2: bus            0        -
+P00.03  0003H  Highest frequency    10.00-400.00                               50.00    0.01Hz
+P00.11  000BH  Acceleration time    0.0-3600.0                                 depends  0.1s
+P14.02  0E02H  Format (0: 8N1; 2: 8E1)  0-5                                    1        -
+-  2000H  Control command           1-8                                        -        -
+"""
+"""As it comes out of a PDF file: gaps of two spaces divide the cells."""
+
+BARS = """\
+| Code | Name | Range | Factory setting | Unit | R/W |
+| --- | --- | --- | ---: | --- | --- |
+| 00-01 | Source | 0=keypad, 1=terminals | 0 | | R/W |
+| 00-08 | Preset frequency | 0.00-50.00 | 50.00 | 0.01Hz | R/W |
+| 01-00 | Running frequency | | | 0.01Hz | R |
+| F0-02 | Of the letter nobody knows the place | | | | R |
+"""
+"""As a web page has it."""
+
+
+def parameters(folder: Path) -> dict[str, dict[str, str]]:
+    with (folder / "acme/parameters.csv").open(encoding="utf-8", newline="") as file:
+        return {row["code"]: row for row in csv.DictReader(file)}
+
+
+def test_what_has_a_code_is_a_parameter(tmp_path: Path) -> None:
+    done = new(tmp_path, PARAMETERS)
+    assert done.exit_code == 0, done.output
+    assert "Of the table: 1 row in registers.csv, 4 rows in parameters.csv." in done.stdout
+    known = drivebus.Profile.load(tmp_path / "acme")
+    told = {
+        code: (row.address, row.unit, row.scale, row.low, row.high, row.default, dict(row.choices))
+        for code in parameters(tmp_path)
+        for row in [known.describe(code)]
+    }
+    assert told == {
+        "P00.01": (0x0001, "", 1, None, None, 0, {0: "keypad", 1: "terminals", 2: "bus"}),
+        "P00.03": (0x0003, "Hz", 100, 10.0, 400.0, 50.0, {}),
+        "P00.11": (0x000B, "s", 10, 0.0, 3600.0, None, {}),
+        "P14.02": (0x0E02, "", 1, None, None, 1, {0: "8N1", 2: "8E1"}),
+    }
+    assert known.describe("control_command").address == 0x2000
+    # Whether a parameter can be written while the motor turns, no column says.
+    assert {row["access"] for row in parameters(tmp_path).values()} == {"unknown"}
+
+
+@pytest.mark.parametrize("from_the_input", [False, True])
+def test_a_table_in_bars_whose_codes_tell_the_addresses(tmp_path: Path, from_the_input: bool) -> None:
+    refused = new(tmp_path, BARS)
+    assert (refused.exit_code, "give --addresses group.index" in refused.stderr) == (2, True)
+    if from_the_input:
+        line = ["profiles", "new", str(tmp_path / "acme"), "--table", "-", "--source", "A1 manual"]
+        done = CliRunner().invoke(cli, [*line, "--addresses", "group.index"], input=BARS)
+    else:
+        done = new(tmp_path, BARS, "--addresses", "group.index")
+    assert done.exit_code == 0, done.output
+    told = {code: (row["address"], row["choices"], row["access"]) for code, row in parameters(tmp_path).items()}
+    assert told == {
+        "00-01": ("0x0001", "0=keypad;1=terminals", "unknown"),
+        "00-08": ("0x0008", "", "unknown"),
+        "01-00": ("0x0100", "", "ro"),
+    }
+    assert 'line 6 is left out: "F0-02" is no code of one register' in done.stderr
+
+
+def test_a_factory_value_that_does_not_fit_is_left_to_the_note(tmp_path: Path) -> None:
+    text = "Code,Address,Name,Unit,Range,Default\nP00.03,0003H,Highest,0.1Hz,10.0-400.0,500.0\n"
+    assert new(tmp_path, text).exit_code == 0
+    [row] = parameters(tmp_path).values()
+    assert (row["default"], row["high"], row["note"]) == ("", "400.0", "the table has the factory value 500.0")
+
+
 @pytest.mark.parametrize("source", ["A1 manual,\np. 42", " A1 manual,\t\np. 42 "])
 def test_a_source_is_one_line(tmp_path: Path, source: str) -> None:
     text = "Address (hex),Name,Unit,Range\n2000,A,1V,0-99999\n2001,B,1V,0-5\n2002,C,1V,0-99999\n"

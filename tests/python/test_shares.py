@@ -6,6 +6,7 @@ the factory; S-5 counts 16384 for 100 %. Words and values are worked out by hand
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -202,3 +203,21 @@ def test_who_waits_and_cannot_look_is_told_that_the_motor_may_turn(tmp_path: Pat
         assert line.drive(1).state == "forward"
         CliRunner().invoke(cli, [*words, "stop"])
         assert line.drive(1).state == "stopped" or line.drive(1).writes()[-1][1:] == (0x0008, 0)
+
+
+def test_each_row_is_read_once_and_what_the_drive_refuses_is_named(tmp_path: Path) -> None:
+    """The simulated drive knows 0010H; a profile that is one off is told so, and nothing is written."""
+    folder = changed(tmp_path / "off", registers=("0x0010,hertz", "0x0019,hertz"))
+    with Simulator({1: SHARE}, transport="pty") as line:
+        words = ["--json", "--port", line.port, "profiles", "check", "--read"]
+        done = CliRunner().invoke(cli, [*words, str(SHARE)])
+        assert done.exit_code == 0, done.output
+        told = {row["name"]: row for row in map(json.loads, done.stdout.splitlines()) if "place" in row}
+        profile = drivebus.Profile.load(SHARE)
+        readable = [name for name in profile.names() if profile.describe(name).access != "wo"]
+        assert len(told) == len(readable) > 4
+        assert (told["hertz"]["place"], float(told["hertz"]["value"])) == ("0010H", 0.0)
+
+        done = CliRunner().invoke(cli, [*words, str(folder)])
+        assert (done.exit_code, "unit 1 refuses hertz: " in done.stderr) == (4, True), done.output
+        assert not line.drive(1).writes()

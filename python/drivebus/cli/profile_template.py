@@ -66,7 +66,7 @@ source = "Not read yet: what nearly every drive can"
 
 # P05.06 is at 0506H. Without [parameters.memory] every write of a parameter is taken to wear EEPROM.
 [parameters]
-address = "group.index"  # or "listed": each row of parameters.csv has its own, in a column "address"
+{rule}
 # closed_groups = [99]   # groups that nobody may touch
 # acts = ["P00.15"]      # writing it does something, such as tuning the motor
 # serial = ["P14"]       # the drive's own line: a restore leaves it alone unless asked
@@ -161,6 +161,9 @@ registers = []
 # ]
 """
 
+_BY_CODE = 'address = "group.index"  # or "listed": each row of parameters.csv has its own, in a column "address"'
+_LISTED = 'address = "listed"  # each row of parameters.csv has its own'
+
 _EXTENDS = """\
 
 # Everything of {base} that is not said here is taken over, as unverified: it can be read, and written only with
@@ -186,8 +189,11 @@ def family_name(folder: str) -> str:
     return re.sub(r"[^a-z0-9_-]+", "-", folder.lower()).strip("-") or "my-drive"
 
 
-def files(folder: str, *, like: str | None = None, overlay: str | None = None) -> dict[str, str]:
-    """The files of a profile in *folder*, by name: from nothing, after a sibling, or over a shipped profile."""
+def files(folder: str, *, like: str | None = None, overlay: str | None = None, listed: bool = False) -> dict[str, str]:
+    """The files of a profile in *folder*, by name: from nothing, after a sibling, or over a shipped profile.
+
+    With *listed*, each parameter has an address of its own.
+    """
     name = family_name(folder)
     if overlay is not None:
         words = {"what": f"What we know of our {overlay} beyond its profile.", "title": f"{name}, a {overlay}"}
@@ -197,7 +203,7 @@ def files(folder: str, *, like: str | None = None, overlay: str | None = None) -
         rest = _VERSION + _EXTENDS.format(base=like)
     else:
         words = {"what": "A family of drives.", "title": name}
-        rest = _VERSION + _NEW.format(name=name, title=name)
+        rest = _VERSION + _NEW.format(name=name, title=name, rule=_LISTED if listed else _BY_CODE)
     filled = like is None and overlay is None
     return {
         "profile.toml": _HEAD.format(schema=_SCHEMA, folder=folder, name=name, **words) + rest,
@@ -209,23 +215,28 @@ def files(folder: str, *, like: str | None = None, overlay: str | None = None) -
 
 
 def files_of_table(folder: str, table: ManualTable, source: str) -> dict[str, str]:
-    """The files of a new profile in *folder* whose registers are those of *table*, by *source*: document and page.
+    """The files of a new profile in *folder* whose rows are those of *table*, by *source*: document and page.
 
     What the loader does not take of a row goes into its note. A row that it does not take at all is left out.
     *table* tells both.
     """
-    written = files(folder) | {"parameters.csv": _PARAMETERS, "faults.csv": _FAULTS}
+    written = files(folder, listed=bool(table.parameters)) | {"faults.csv": _FAULTS}
     if any(row.table == "input" for row in table.rows):
         written["profile.toml"] = written["profile.toml"].replace("functions = [0x03, ", "functions = [0x03, 0x04, ")
     while True:
-        written["registers.csv"] = table.csv(source)
+        written |= table.csv(source)
         with tempfile.TemporaryDirectory(prefix="drivebus-profile-") as place:
             for name, text in written.items():
                 Path(place, name).write_text(text, encoding="utf-8", newline="\n")
             problems = drivebus.Profile.check(place)
         # The template has no mistake of its own.
-        wrong = {problem["line"]: problem["reason"] for problem in problems if problem["line"] is not None}
+        rows = {"registers.csv": table.registers, "parameters.csv": table.parameters}
+        wrong = {
+            (Path(problem["file"]).name, problem["line"]): problem["reason"]
+            for problem in problems
+            if problem["line"] is not None
+        }
         if not wrong:
             return written
-        for line, reason in sorted(wrong.items(), reverse=True):
-            table.give_up(line, reason)
+        for (name, line), reason in wrong.items():
+            table.give_up(rows[name][line - 2], reason)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
@@ -9,12 +10,14 @@ import click
 import drivebus
 from drivebus.cli import profile_template
 from drivebus.cli.halts_elsewhere import started_by
-from drivebus.cli.manual_table import COUNTS, ManualTable
+from drivebus.cli.manual_cells import COUNTS
+from drivebus.cli.manual_table import ManualTable
 from drivebus.cli.names import complete_profile
 from drivebus.cli.option_types import Place
 from drivebus.cli.present.families import KINDS, Families, FamilyRules, Mistakes
 from drivebus.cli.present.help_format import Listing
 from drivebus.cli.present.output import remark
+from drivebus.cli.row_reads import read_rows
 from drivebus.cli.session import Session, pass_session
 from drivebus.cli.wrong_use import WrongUse
 
@@ -41,13 +44,15 @@ def show(session: Session, family: str) -> None:
 
 @profiles.command()
 @click.argument("folder", type=Place(path_type=Path))
+@click.option("--read", is_flag=True, help="Also read each row once from the drive, to compare with its keypad.")
 @pass_session
 @click.pass_context
-def check(context: click.Context, session: Session, folder: Path) -> None:
+def check(context: click.Context, session: Session, folder: Path, read: bool) -> None:
     """Check the profile in FOLDER. Each mistake is named with its file, its line, and what would be right.
 
-    Ends with exit code 2 if there are mistakes. A warning says which halts of it start a shipped family: that is no
-    mistake, but a drive of that family at this address would run. A profile is read, never executed.
+    Ends with exit code 2 if there are mistakes, with 4 if the drive refuses a row. A warning says which halts of it
+    start a shipped family: that is no mistake, but a drive of that family at this address would run. A profile is
+    read, never executed.
     """
     problems = drivebus.Profile.check(folder)
     session.out.render(Mistakes(problems))
@@ -62,6 +67,22 @@ def check(context: click.Context, session: Session, folder: Path) -> None:
     rows = ", ".join(f"{total} {kind if total != 1 else kind.removesuffix('s')}" for kind, total in totals.items())
     session.out.say(f"{folder} is sound: {rows}.")
     _say_what_is_missing(profile)
+    if read and not _compare(session, profile):
+        context.exit(4)
+
+
+def _compare(session: Session, profile: drivebus.Profile) -> bool:
+    """Shows what the drive has in each row. Whether it refused none."""
+    with session.bus() as bus:
+        reads = list(read_rows(bus.drive(session.unit, profile=profile, unverified=True)))
+    session.out.rows(["name", "place", "value", "unit", "label"], [each[:5] for each in reads], spare=["label"])
+    refused = [each.name for each in reads if not each.is_there]
+    if refused:
+        remark(
+            f"Error: {session.called} refuses {', '.join(refused)}: it has nothing there, or the address is one off. "
+            "Some manuals count addresses from 1"
+        )
+    return not refused
 
 
 def _say_what_is_missing(profile: drivebus.Profile) -> None:
@@ -98,7 +119,7 @@ def _warn(profile: drivebus.Profile) -> None:
 @click.option(
     "--table",
     type=Place(path_type=Path),
-    help="The manual's table of registers, as a spreadsheet saves it: its rows are taken.",
+    help="The manual's table of registers or parameters, as a spreadsheet saves it, or pasted; - is the input.",
 )
 @click.option("--source", metavar="TEXT", help="Where the table is printed: manual, edition, page.")
 @click.option("--addresses", type=click.Choice(COUNTS), help="How the table writes addresses, where they do not tell.")
@@ -114,7 +135,8 @@ def new(
 ) -> None:
     """Start a profile: write its files, with comments that explain them. Nothing is overwritten.
 
-    With --table its registers are those of a manual's table. Each row that could not be read is named, with the reason.
+    With --table its rows are those of a manual's table: with a code, parameters, else registers. Each row that could
+    not be read is named, with the reason.
     """
     if (like is not None) + (overlay is not None) + (table is not None) > 1:
         raise WrongUse("give one of --like, --overlay and --table: a profile is a copy, an overlay, or new")
@@ -127,7 +149,7 @@ def new(
         drivebus.Profile.builtin(base)
     try:
         name = folder.resolve().name
-        read = None if table is None else ManualTable(table.read_bytes(), count=addresses)
+        read = None if table is None else ManualTable(_read(table), count=addresses)
         if read is None or not source:
             written = profile_template.files(name, like=like, overlay=overlay)
         else:
@@ -149,10 +171,19 @@ def new(
     session.out.say(f"Fill them in, then: drivebus profiles check {folder}")
 
 
+def _read(table: Path) -> bytes:
+    if str(table) != "-":
+        return table.read_bytes()
+    if sys.stdin.isatty():
+        remark("Paste the table, its line of titles first; then Ctrl-D on a line of its own.")
+    return sys.stdin.buffer.read()
+
+
 def _tell(session: Session, table: ManualTable) -> None:
     """What of *table* was taken, and what was not."""
-    rows = "1 row" if len(table.rows) == 1 else f"{len(table.rows)} rows"
-    session.out.say(f"{rows} of the table stand in registers.csv. Compare each with the manual: name, scale, range.")
+    taken = [("registers.csv", len(table.registers)), ("parameters.csv", len(table.parameters))]
+    files = [f"{count} row{'s' * (count != 1)} in {name}" for name, count in taken if count or not table.rows]
+    session.out.say(f"Of the table: {', '.join(files)}. Compare each with the manual: name, scale, range.")
     for row in table.rows:
         if row.notes:
             session.out.say(f"line {row.line}, {row.name}: {'; '.join(row.notes)}")

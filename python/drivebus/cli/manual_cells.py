@@ -1,0 +1,187 @@
+"""Cells of a manual's table: what one of them says, and what may mean two things."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from drivebus.cli.wrong_use import WrongUse
+
+__all__ = [
+    "COUNTS",
+    "TableRow",
+    "count_of",
+    "is_code",
+    "place_of",
+    "place_of_code",
+    "take_choices",
+    "take_range",
+    "take_step",
+]
+
+COUNTS = ("hex", "decimal", "40001", "group.index")
+"""How addresses may be written: in hexadecimal, in decimal, as numbers of registers from 40001 on, or by the code of a
+parameter alone, of which P05.06 is at 0506H."""
+
+_UNIT = r"Hz|kHz|A|V|%|rpm|r/min|kW|W|ms|s|min|h|°C|℃|kWh|N·?m"
+_STEP = re.compile(rf"(?:unit:? ?)?(?P<step>\d+(?:\.\d+)?)? ?(?P<unit>{_UNIT})?")
+_NUMBER = r"[-+]?\d+(?:\.\d+)?"
+_RANGE = re.compile(rf"({_NUMBER}) ?(?:{_UNIT})? ?(?:-|\u2013|~|to|\u2026|\.\.\.?) ?({_NUMBER}) ?(?:{_UNIT})?")
+_HEX = r"0x[0-9a-f]+|[0-9a-f]{1,4}h|(?=.*[a-f])[0-9a-f]{1,4}"
+"""What is in hexadecimal beyond doubt."""
+_SCALES = (1, 10, 100, 1000, 10000)
+_CODE = re.compile(r"[A-Z]{0,3}\.?\d{1,3}[.-]\d{1,3}|[A-Z]{1,3}\.? ?\d{2,4}|[a-z][A-Za-z0-9]{2,3}")
+"""P05.06, F0-01, 02-00, C014, Pr.117, tFr: how makers call parameters. A number alone may be that of the row."""
+_MARK = re.compile(r"(?<![\w.+-])(\d{1,3}) ?[:=\uff1a] ?")
+"""The number before what it means: `0: keypad`, `2=bus`."""
+
+
+@dataclass
+class TableRow:
+    """One row that could be read.
+
+    Attributes:
+        line: Where it stands in the table, from 1.
+        address: On the wire, 0..0xFFFF.
+        table: `"holding"`, or `"input"` for numbers from 30001 on.
+        name: One word, made of its label.
+        label: As the manual has it.
+        unit: Empty for a plain number.
+        scale: Counts in one unit; None where the table does not tell.
+        low, high: The range as it is printed, or empty.
+        access: As `registers.csv` has it.
+        code: That of a parameter; empty for a register.
+        default: As it is printed, or empty.
+        choices: What the values of a parameter mean.
+        notes: What was not taken over.
+    """
+
+    line: int
+    address: int
+    table: str
+    name: str
+    label: str
+    unit: str = ""
+    scale: int | None = None
+    low: str = ""
+    high: str = ""
+    access: str = "unknown"
+    code: str = ""
+    default: str = ""
+    choices: dict[int, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def without_range(self) -> None:
+        """Leaves the range to the note: it does not fit the step."""
+        self.notes.append(f"the table has the range {self.low} to {self.high}")
+        self.low = self.high = ""
+
+
+def count_of(title: str, cells: Sequence[str]) -> str:
+    """How the addresses are written.
+
+    Raises:
+        WrongUse: They may be hexadecimal or decimal.
+    """
+    said = [cell.strip().lower() for cell in cells if cell.strip()]
+    if "hex" in title.lower() or any(re.fullmatch(_HEX, one) for one in said):
+        return "hex"
+    if "dec" in title.lower():
+        return "decimal"
+    if said and all(re.fullmatch(r"[34]\d{4}|[34]0\d{4}", one) for one in said if one.isdigit()):
+        return "40001"
+    raise WrongUse(
+        f"addresses such as {said[0] if said else 'none'} may be hexadecimal or decimal; "
+        "the manual says which: give --addresses hex or --addresses decimal"
+    )
+
+
+def place_of(cell: str, count: str) -> tuple[str, int] | None:
+    """Table and address of *cell*; None where it is not one register."""
+    text = cell.replace(" ", "").lower()
+    if count == "hex":
+        found = re.fullmatch(r"(?:0x)?([0-9a-f]{1,4})h?", text)
+        return ("holding", int(found[1], 16)) if found else None
+    if not text.isdecimal() or not text.isascii():
+        return None
+    if count == "decimal":
+        return ("holding", int(text)) if int(text) <= 0xFFFF else None
+    if len(text) not in {5, 6} or text[0] not in "34" or int(text[1:]) == 0:
+        return None
+    address = int(text[1:]) - 1
+    return ("holding" if text[0] == "4" else "input", address) if address <= 0xFFFF else None
+
+
+def take_step(row: TableRow, cells: dict[str, str]) -> None:
+    """Unit and scale, from a step such as `0.01Hz`, a unit, or counts in one unit."""
+    step = None
+    for what in ("unit", "step", "scale", "says"):
+        said = _plain(cells.get(what, ""))
+        if not said or said == "-":
+            continue
+        found = _STEP.fullmatch(said)
+        if found is None:
+            row.notes.append(f"the table says {said!r}" if what == "says" else f"the table has {said!r} as its {what}")
+            continue
+        row.unit = row.unit or (found["unit"] or "").replace("r/min", "rpm").replace("℃", "°C")
+        if found["step"]:
+            number = Fraction(found["step"])
+            # Counts in one unit, where it is more than one and the column does not call it a step.
+            step = 1 / number if what == "scale" and number > 1 else number
+    if step is None:
+        # Where no column has a step or a unit, nothing says that there is none.
+        is_told = any(cells.get(what) is not None for what in ("unit", "step", "scale"))
+        row.scale = 1 if is_told and not row.unit and not row.notes and not cells.get("unit") else None
+    elif step and 1 / step in _SCALES:
+        row.scale = int(1 / step)
+    else:
+        row.notes.append(f"the table has steps of {float(step):g}")
+
+
+def take_range(row: TableRow, cells: dict[str, str]) -> None:
+    """The lowest and the highest value, where the step is known: else the range goes into the note."""
+    low, high = _plain(cells.get("low", "")), _plain(cells.get("high", ""))
+    said = _plain(cells.get("range", "")) or f"{low}-{high}".strip("-")
+    found = _RANGE.fullmatch(said)
+    if found is not None and row.scale is not None:
+        row.low, row.high = found[1], found[2]
+    elif said:
+        row.notes.append(f"the table has the range {said}")
+
+
+def _plain(cell: str) -> str:
+    """*cell* with decimal points: a comma is one, unless three digits behind it may make it a thousand."""
+    return re.sub(r"(?<=\d),(?=(?:\d{1,2}|\d{4,})(?!\d))", ".", cell)
+
+
+def is_code(cell: str) -> bool:
+    """Whether *cell* calls a parameter."""
+    return _CODE.fullmatch(cell) is not None
+
+
+def place_of_code(code: str) -> tuple[str, int] | None:
+    """Where a parameter is whose group is the high byte and whose index the low one; None where it has no such code."""
+    # The letter of F0-01 or U0-00 is a part of the address, and the manual alone says which.
+    found = re.fullmatch(r"[PR]?(\d{1,3})[.-](\d{1,3})", code)
+    if found is None or max(int(found[1]), int(found[2])) > 0xFF:
+        return None
+    return ("holding", int(found[1]) << 8 | int(found[2]))
+
+
+def take_choices(row: TableRow, cells: dict[str, str]) -> bool:
+    """What the values of a parameter mean, out of its range or of its description. Whether one of them says that."""
+    for what in ("range", "choices", "says", "label"):
+        said = cells.get(what, "")
+        marks = list(_MARK.finditer(said))
+        if len(marks) < 2:
+            continue
+        numbers = [int(mark[1]) for mark in marks]
+        ends = [*(mark.start() for mark in marks[1:]), len(said)]
+        labels = [said[mark.end() : end].strip(" ,;/)(") for mark, end in zip(marks, ends, strict=True)]
+        if len({*numbers}) < len(numbers) or not all(labels):
+            continue
+        row.choices = {number: re.sub("[;=]", ",", label) for number, label in zip(numbers, labels, strict=True)}
+        return True
+    return False
