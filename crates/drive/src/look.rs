@@ -220,11 +220,12 @@ impl Looks {
             let Some(raw) = value.and_then(|value| u16::try_from(value.count() & 0xFFFF).ok()) else { continue };
             match word.role {
                 Role::State => state = Some(raw),
-                Role::Fault => fault = Some(self.profile.fault_number(raw)),
+                Role::Fault => fault = Some(raw),
                 Role::Bits => {}
             }
             fields.extend(word.bits.iter().map(|field| (field.name().to_owned(), field.meaning(raw).into_owned())));
         }
+        let fault = self.fault_number(state, fault);
         Look {
             state: state.map_or(State::Unknown, |raw| self.profile.state(raw)),
             word: state,
@@ -233,6 +234,17 @@ impl Looks {
             fields,
             asked,
         }
+    }
+
+    /// The number of the present fault where these are the state `word` and the `raw` word of the fault; 0 is none.
+    ///
+    /// `None` where that is not known: of a number that holds, the state alone says whether it is the present one.
+    pub fn fault_number(&self, word: Option<u16>, raw: Option<u16>) -> Option<u16> {
+        let number = self.profile.fault_number(raw?);
+        if !self.profile.fault_holds() {
+            return Some(number);
+        }
+        word.map(|word| if self.profile.is_in_fault(word) { number } else { 0 })
     }
 
     /// Whether a drive is in fault whose state `word` and number of the `fault` are these; `None` is what is not known.

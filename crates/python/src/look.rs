@@ -48,7 +48,7 @@ impl Looks {
     #[pyo3(signature = (state, fault, /))]
     fn read_off(&self, state: Option<u16>, fault: Option<u16>) -> (&'static str, u16, bool) {
         let profile = self.looks.profile();
-        let number = fault.map(|raw| profile.fault_number(raw));
+        let number = self.looks.fault_number(state, fault);
         let doing = state.map_or(State::Unknown, |raw| profile.state(raw));
         (doing.name(), number.unwrap_or_default(), self.looks.is_in_fault(state, number))
     }

@@ -20,6 +20,10 @@ pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problem
     setpoints(file, profile, problems);
     functions(file, manifest, profile, problems);
     sequence(file, profile, problems);
+    if profile.fault_holds() && !(profile.state_tells_fault() && profile.role("fault").is_some()) {
+        let reason = "\"fault_holds\" needs a register of the fault, and a state that says when the drive is in fault";
+        problems.add(file, 1, reason.to_owned());
+    }
 }
 
 /// The bit that says where a write is kept is no part of any address.

@@ -9,6 +9,8 @@ use crate::profile::Profile;
 pub(crate) struct Roles {
     pub(crate) identification: Option<String>,
     pub(crate) fault: Option<String>,
+    /// Whether its register keeps the number after a reset.
+    pub(crate) fault_holds: bool,
     pub(crate) frequency: Option<String>,
     pub(crate) setpoint: Option<String>,
     /// The time that the ramp of a stop takes to 0 Hz, and the frequency that it is counted from.
@@ -75,6 +77,12 @@ impl Profile {
     pub fn fault_number(&self, raw: u16) -> u16 {
         let shared = self.role("fault").and_then(|entry| entry.bits().iter().find(|field| field.name() == "fault"));
         shared.map_or(raw, |field| field.extract(raw))
+    }
+
+    /// Whether the register of the present fault keeps its number after a reset: it is the last fault then, and the present one
+    /// while the state word says that the drive is in fault.
+    pub fn fault_holds(&self) -> bool {
+        self.roles.fault_holds
     }
 
     /// The words whose bit fields tell more of the state than the state itself.

@@ -253,7 +253,7 @@ impl Own<'_> {
             direction: self.direction(),
             acceleration: parameter(Some(ACCELERATION), "s").or(deceleration),
             deceleration,
-            fault_history: self.profile.fault_history().filter_map(Entry::address).collect(),
+            fault_history: self.remembered().filter_map(Entry::address).collect(),
             bus_timeout: on_silence
                 .as_ref()
                 .and_then(|_| parameter(watchdog.map(|watchdog| watchdog.timeout.as_str()), "s")),
@@ -297,10 +297,17 @@ impl Own<'_> {
         self.profile.faults().find(|fault| fault.mnemonic == mnemonic).map(|fault| fault.code)
     }
 
-    /// The registers that the drive keeps its last faults in.
+    /// Where the drive remembers faults, the latest first: what it shows as the present one too, where that holds.
+    fn remembered(&self) -> impl Iterator<Item = &Entry> {
+        let holding = self.profile.role("fault").filter(|_| self.profile.fault_holds());
+        let history = self.profile.fault_history();
+        holding.into_iter().chain(history.filter(move |entry| holding.is_none_or(|held| held.name() != entry.name())))
+    }
+
+    /// Those of them that are registers.
     fn kept_registers(&self) -> impl Iterator<Item = u16> {
         let is_kept = |entry: &&Entry| entry.kind() == EntryKind::Register && entry.table() == Table::Holding;
-        self.profile.fault_history().filter(is_kept).filter_map(Entry::address)
+        self.remembered().filter(is_kept).filter_map(Entry::address)
     }
 
     fn registers(&self, states: [u16; 4]) -> Vec<Register> {
