@@ -24,9 +24,10 @@ VARIANTS = {
     "a1000": {"speed_unit": "Hz"},
     "fc51": {"base_frequency": "50 Hz"},
     "v20": {"base_frequency": "50 Hz"},
+    "md500": {"max_frequency": "50 Hz"},
     "acs355": {"base_frequency": "50 Hz"},
 }
-"""As they come from the factory: P30.14 is 1, o1-03 is 0; 3-03, P2000 and 1105 are 50 Hz."""
+"""As they come from the factory: P30.14 is 1, o1-03 is 0; 3-03, P2000, F0-10 and 1105 are 50 Hz."""
 
 READ_ONLY = {
     "vfd500": 0x04,
@@ -34,18 +35,22 @@ READ_ONLY = {
     **dict.fromkeys(
         [
             *("ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
-            *("wj200", "h100"),
+            *("wj200", "h100", "md500"),
         ],
         0x02,
     ),
 }
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
 OUT_OF_RANGE = dict.fromkeys(
-    ["ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "v20", "wj200", "h100"], 0x03
+    ["ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "v20", "wj200", "h100", "md500"], 0x03
 )
 """And a value that is out of range, where it is not their 04H."""
 
-WITHOUT = {"vfd500": {"jog_stop"}, "fc51": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"}}
+WITHOUT = {
+    "vfd500": {"jog_stop"},
+    "md500": {"jog_stop"},
+    "fc51": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
+}
 """The commands that a family does not have."""
 
 PASSWORD = "P07.00"

@@ -42,6 +42,7 @@ FAMILIES = {
     26: "h100",
     27: "vfd-e",
     28: "yl620",
+    29: "md500",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -236,6 +237,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "chf100a",
             "ms300",
             "yl620",
+            "md500",
             "saj8000m",
             "eds300",
             "sunfar-e300",

@@ -19,7 +19,9 @@ QUESTIONS = {
     # One of these is also asked for 200BH, which a YL620 has: it would turn at ten times the speed.
     **dict.fromkeys(("ms300", "vfd-e"), (6, 108)),
     "yl620": (4, 75),
-    **dict.fromkeys(("chf100a", "saj8000m"), (6, 103)),
+    "md500": (5, 90),
+    # An MD500 has its setpoint where these take their commands, and is asked for 7000H.
+    **dict.fromkeys(("chf100a", "saj8000m"), (7, 120)),
     **dict.fromkeys(("atv312", "a1000"), (6, 105)),
     "v20": (8, 140),
     "acs355": (9, 155),

@@ -53,10 +53,24 @@ SILENT_ON_CODES = [
     "wj200",
     "h100",
     "yl620",
+    "md500",
 ]
 """The families whose units refuse 2103H."""
 
-SIGNED = ["vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "wj200", "h100"]
+SIGNED = [
+    "vfd500",
+    "yl620",
+    "a1000",
+    "eds300",
+    "sunfar-e300",
+    "fc51",
+    "atv312",
+    "v20",
+    "acs355",
+    "wj200",
+    "h100",
+    "md500",
+]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
 NO_SIGNATURE = [family for family in SILENT_ON_CODES if family not in SIGNED]
@@ -85,6 +99,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "ms300": ["ms300"],
     "vfd-e": ["vfd-e"],
     "yl620": ["yl620"],
+    # And this one 7000H and 3000H.
+    "md500": ["md500"],
     # And this one 004BH and 0034H, this one 2180H, and this one D000H.
     "a1000": ["a1000"],
     "eds300": ["eds300"],

@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 28] = [
+static BUILTINS: [Builtin; 29] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -162,6 +162,7 @@ static BUILTINS: [Builtin; 28] = [
     builtin!("ms300": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("vfd-e": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("yl620": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("md500": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("a1000": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("saj8000m": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("eds300": "registers.csv" "parameters.csv" "faults.csv"),

@@ -193,10 +193,10 @@ impl Drive {
         if self.is_locked() { Err(Refusal::Locked) } else { Ok(()) }
     }
 
-    /// The address without the bit for the other memory.
+    /// The address at which is read what is written at `address`.
     pub(super) fn plain(&self, address: u32) -> u32 {
         match table_of(address) {
-            (Table::Holding, _) => address & !u32::from(self.family().memory.mask()),
+            (Table::Holding, _) => self.family().memory.plain(address),
             _ => address,
         }
     }
@@ -206,7 +206,7 @@ impl Drive {
         match (self.map.word(plain)?, self.family().memory, address == plain) {
             (Word::Register(_), _, true) => Some(Target::Control),
             (Word::Register(_), _, false) | (Word::Parameter(_), Memory::EepromOnly, false) => None,
-            (Word::Parameter(_), Memory::BitMeansRam(_), false)
+            (Word::Parameter(_), Memory::BitMeansRam(_) | Memory::BitsMeanEeprom(_), false)
             | (Word::Parameter(_), Memory::BitMeansEeprom(_), true)
             | (Word::Parameter(_), Memory::RamUntil(..), _) => Some(Target::Ram),
             (Word::Parameter(_), _, _) => Some(Target::Eeprom),

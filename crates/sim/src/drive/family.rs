@@ -22,6 +22,7 @@ mod gd350;
 mod gd600;
 mod h100;
 mod handshake;
+mod md500;
 mod ms300;
 pub(crate) mod own;
 mod register;
@@ -111,6 +112,8 @@ pub(crate) enum Memory {
     BitMeansRam(u16),
     /// Plain addresses write to RAM only; with the bit the word is kept in EEPROM.
     BitMeansEeprom(u16),
+    /// Addresses with these bits are kept in EEPROM and read; without all of them the word goes to RAM only.
+    BitsMeanEeprom(u16),
     /// Every write is kept in EEPROM; there is no address with such a bit.
     EepromOnly,
     /// Every write goes to RAM, until the word at this address has one of these bits: that stores all, and the bits go back to 0.
@@ -121,11 +124,12 @@ pub(crate) enum Memory {
 const MEMORY_BIT: u16 = 0x8000;
 
 impl Memory {
-    /// The bit; 0 where there is none.
-    pub(crate) fn mask(self) -> u16 {
+    /// Where what is written at `address` is read.
+    pub(crate) fn plain(self, address: u32) -> u32 {
         match self {
-            Self::BitMeansRam(bit) | Self::BitMeansEeprom(bit) => bit,
-            Self::EepromOnly | Self::RamUntil(..) => 0,
+            Self::BitMeansRam(bit) | Self::BitMeansEeprom(bit) => address & !u32::from(bit),
+            Self::BitsMeanEeprom(bits) if address & u32::from(bits) == 0 => address | u32::from(bits),
+            Self::BitsMeanEeprom(_) | Self::EepromOnly | Self::RamUntil(..) => address,
         }
     }
 }
@@ -140,7 +144,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 28] = [
+const FAMILIES: [fn() -> Family; 29] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -159,6 +163,7 @@ const FAMILIES: [fn() -> Family; 28] = [
     ms300::ms300,
     vfd_e::vfd_e,
     yl620::yl620,
+    md500::md500,
     a1000::a1000,
     saj8000m::saj8000m,
     eds300::eds300,

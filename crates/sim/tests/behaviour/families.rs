@@ -195,6 +195,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "acs355",
         "h100",
         "yl620",
+        "md500",
     ] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }

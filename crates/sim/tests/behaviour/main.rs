@@ -14,6 +14,7 @@ mod families;
 mod faults;
 mod fc51;
 mod goodrives;
+mod inovance;
 mod memory;
 mod own_profiles;
 mod ports;
