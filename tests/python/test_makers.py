@@ -310,7 +310,7 @@ class TestDelta:
         asked = [data[2:4].hex() for _, who, data in line.line.trace() if who == "master" and data[1] == 0x03]
         assert list(dict.fromkeys(asked)) == [
             *("2103", "1900", "2104", "2106", "200b", "3000"),
-            *("2108", "7000", "004b", "2180", "d000", "0c81", "006d", "0003", "c417", "1003"),
+            *("2108", "7000", "004b", "2180", "d000", "045c", "0c81", "006d", "0003", "c417", "1003"),
         ]
 
     @pytest.mark.parametrize(("hertz", "word"), [(4.16, 0x01A0), (2.64, 0x0108), (2.66, 0x010A)])

@@ -43,6 +43,7 @@ FAMILIES = {
     27: "vfd-e",
     28: "yl620",
     29: "md500",
+    30: "fr-d700",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 

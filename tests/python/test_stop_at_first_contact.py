@@ -20,6 +20,7 @@ QUESTIONS = {
     **dict.fromkeys(("ms300", "vfd-e"), (6, 108)),
     "yl620": (4, 75),
     "md500": (5, 90),
+    "fr-d700": (5, 92),
     # An MD500 has its setpoint where these take their commands, and is asked for 7000H.
     **dict.fromkeys(("chf100a", "saj8000m"), (7, 120)),
     **dict.fromkeys(("atv312", "a1000"), (6, 105)),

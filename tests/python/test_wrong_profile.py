@@ -54,10 +54,12 @@ SILENT_ON_CODES = [
     "h100",
     "yl620",
     "md500",
+    "fr-d700",
 ]
 """The families whose units refuse 2103H."""
 
 SIGNED = [
+    "fr-d700",
     "vfd500",
     "yl620",
     "a1000",
@@ -101,6 +103,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "yl620": ["yl620"],
     # And this one 7000H and 3000H.
     "md500": ["md500"],
+    # And this one 045CH, Pr.117, and 00C8H.
+    "fr-d700": ["fr-d700"],
     # And this one 004BH and 0034H, this one 2180H, and this one D000H.
     "a1000": ["a1000"],
     "eds300": ["eds300"],

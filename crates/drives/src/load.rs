@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 29] = [
+static BUILTINS: [Builtin; 30] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -167,6 +167,7 @@ static BUILTINS: [Builtin; 29] = [
     builtin!("saj8000m": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("eds300": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("sunfar-e300": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("fr-d700": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("atv312": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("v20": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("acs355": "registers.csv" "parameters.csv" "faults.csv"),

@@ -46,7 +46,16 @@ fn rows(family: &str) -> BTreeMap<(String, u16), Row> {
     let manifest = std::fs::read_to_string(folder(family).join("profile.toml")).unwrap();
     let own = |family: &str| -> BTreeMap<(String, u16), Row> {
         let all = ["registers.csv", "parameters.csv"].into_iter().flat_map(|file| table(family, file));
-        all.map(|row| ((cell(&row, "table").to_owned(), place(&row).1), row)).collect()
+        let mut rows = BTreeMap::new();
+        for row in all {
+            let mut key = (cell(&row, "table").to_owned(), place(&row).1);
+            if rows.contains_key(&key) {
+                // A state and a command at one address.
+                key.0.push_str(", the other way");
+            }
+            rows.insert(key, row);
+        }
+        rows
     };
     let mut rows = if manifest.contains("\n[extends]\n") { own("gd350") } else { BTreeMap::new() };
     let manifest: toml::Table = manifest.parse().unwrap();
@@ -198,6 +207,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("chv100", 24),
         ("eds300", 17),
         ("fc51", 23),
+        ("fr-d700", 39),
         ("gd10", 81),
         ("gd100", 94),
         ("gd20", 92),

@@ -15,6 +15,7 @@ mod atv312;
 mod chf100a;
 mod eds300;
 mod fc51;
+mod fr_d700;
 mod gd200a;
 mod gd300;
 mod gd3000;
@@ -144,7 +145,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 29] = [
+const FAMILIES: [fn() -> Family; 30] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -172,6 +173,7 @@ const FAMILIES: [fn() -> Family; 29] = [
     v20::v20,
     acs355::acs355,
     fc51::fc51,
+    fr_d700::fr_d700,
     wj200::wj200,
     h100::h100,
 ];

@@ -16,6 +16,7 @@ mod fc51;
 mod goodrives;
 mod inovance;
 mod memory;
+mod mitsubishi;
 mod own_profiles;
 mod ports;
 mod refusals;
