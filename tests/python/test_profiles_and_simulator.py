@@ -25,8 +25,9 @@ VARIANTS = {
     "fc51": {"base_frequency": "50 Hz"},
     "v20": {"base_frequency": "50 Hz"},
     "acs355": {"base_frequency": "50 Hz"},
+    "acs580": {"base_frequency": "50 Hz"},
 }
-"""As they come from the factory: P30.14 is 1, o1-03 is 0; 3-03, P2000 and 1105 are 50 Hz."""
+"""As they come from the factory: P30.14 is 1, o1-03 is 0; 3-03, P2000, 1105 and 46.02 are 50 Hz."""
 
 READ_ONLY = {
     "vfd500": 0x04,
@@ -34,7 +35,7 @@ READ_ONLY = {
     **dict.fromkeys(
         [
             *("ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
-            *("wj200", "h100"),
+            *("acs580", "wj200", "h100"),
         ],
         0x02,
     ),

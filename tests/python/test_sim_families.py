@@ -42,6 +42,7 @@ FAMILIES = {
     26: "h100",
     27: "vfd-e",
     28: "yl620",
+    29: "acs580",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 

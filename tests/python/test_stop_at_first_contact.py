@@ -22,7 +22,9 @@ QUESTIONS = {
     **dict.fromkeys(("chf100a", "saj8000m"), (6, 103)),
     **dict.fromkeys(("atv312", "a1000"), (6, 105)),
     "v20": (8, 140),
-    "acs355": (9, 155),
+    # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there.
+    "acs355": (10, 172),
+    "acs580": (9, 155),
 }
 """Requests before the first frame that halts, and milliseconds of the line's time until it goes out, at most."""
 

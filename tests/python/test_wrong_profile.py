@@ -50,13 +50,16 @@ SILENT_ON_CODES = [
     "atv312",
     "v20",
     "acs355",
+    "acs580",
     "wj200",
     "h100",
     "yl620",
 ]
 """The families whose units refuse 2103H."""
 
-SIGNED = ["vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "wj200", "h100"]
+SIGNED = [
+    *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "atv312", "v20", "acs355", "acs580", "wj200", "h100")
+]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
 NO_SIGNATURE = [family for family in SILENT_ON_CODES if family not in SIGNED]
@@ -95,6 +98,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "v20": ["v20"],
     # And this one the three words of the ABB drives profile, 0000H, 0003H and 0066H.
     "acs355": ["acs355"],
+    # And this one, beside the first two of them, 58.01: 16A8H.
+    "acs580": ["acs580"],
     # And this one answers C417H and 3F01H, its status word and its output frequency.
     "fc51": ["fc51"],
     # Of these nothing is known that they must say; a code gives another one away, or strange words and a signature.

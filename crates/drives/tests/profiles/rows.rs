@@ -192,6 +192,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("a1000", 21),
         ("acs355", 11),
         ("atv312", 33),
+        ("acs580", 15),
         ("chf100a", 27),
         ("wj200", 20),
         ("h100", 173),

@@ -11,6 +11,7 @@
 
 mod a1000;
 mod acs355;
+mod acs580;
 mod atv312;
 mod chf100a;
 mod eds300;
@@ -138,7 +139,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 28] = [
+const FAMILIES: [fn() -> Family; 29] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -164,6 +165,7 @@ const FAMILIES: [fn() -> Family; 28] = [
     atv312::atv312,
     v20::v20,
     acs355::acs355,
+    acs580::acs580,
     fc51::fc51,
     wj200::wj200,
     h100::h100,

@@ -193,6 +193,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "atv312",
         "v20",
         "acs355",
+        "acs580",
         "h100",
         "yl620",
     ] {
