@@ -43,6 +43,7 @@ FAMILIES = {
     27: "vfd-e",
     28: "yl620",
     29: "acs580",
+    30: "fc202",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -244,6 +245,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "v20",
             "acs355",
             "fc51",
+            "fc202",
             "h100",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown

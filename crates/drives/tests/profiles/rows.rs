@@ -199,6 +199,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("chv100", 24),
         ("eds300", 17),
         ("fc51", 23),
+        ("fc202", 14),
         ("gd10", 81),
         ("gd100", 94),
         ("gd20", 92),

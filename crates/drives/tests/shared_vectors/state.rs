@@ -91,7 +91,7 @@ fn of_the_shipped_profiles_only_five_words_say_two_things() {
             let runs = said.iter().any(|state| state.is_running());
             assert_eq!(profile.state(raw).is_running(), runs, "{name}: {raw:04X}H is {said:?}");
             assert!(
-                said.len() < 2 || ["vfd500", "a1000", "fc51", "v20", "acs355", "acs580"].contains(&name),
+                said.len() < 2 || ["vfd500", "a1000", "fc51", "fc202", "v20", "acs355", "acs580"].contains(&name),
                 "{name}: {raw:04X}H is {said:?}"
             );
             assert_eq!(profile.is_in_fault(raw), said.contains(&State::Fault), "{name}: {raw:04X}H");

@@ -15,6 +15,7 @@ mod acs580;
 mod atv312;
 mod chf100a;
 mod eds300;
+mod fc202;
 mod fc51;
 mod gd200a;
 mod gd300;
@@ -139,7 +140,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 29] = [
+const FAMILIES: [fn() -> Family; 30] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -167,6 +168,7 @@ const FAMILIES: [fn() -> Family; 29] = [
     acs355::acs355,
     acs580::acs580,
     fc51::fc51,
+    fc202::fc202,
     wj200::wj200,
     h100::h100,
 ];

@@ -190,6 +190,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "saj8000m",
         "sunfar-e300",
         "fc51",
+        "fc202",
         "atv312",
         "v20",
         "acs355",
