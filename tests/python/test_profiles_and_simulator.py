@@ -23,11 +23,13 @@ VARIANTS = {
     "vfd500": {"speed_unit": "Hz"},
     "a1000": {"speed_unit": "Hz"},
     "fc51": {"base_frequency": "50 Hz"},
+    "fc202": {"base_frequency": "50 Hz"},
     "v20": {"base_frequency": "50 Hz"},
     "md500": {"max_frequency": "50 Hz"},
     "acs355": {"base_frequency": "50 Hz"},
+    "acs580": {"base_frequency": "50 Hz"},
 }
-"""As they come from the factory: P30.14 is 1, o1-03 is 0; 3-03, P2000, F0-10 and 1105 are 50 Hz."""
+"""As they come from the factory: P30.14 is 1, o1-03 is 0; 3-03, P2000, F0-10, 1105 and 46.02 are 50 Hz."""
 
 READ_ONLY = {
     "vfd500": 0x04,
@@ -35,7 +37,7 @@ READ_ONLY = {
     **dict.fromkeys(
         [
             *("ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
-            *("wj200", "h100", "md500", "fr-d700"),
+            *("acs580", "fc202", "wj200", "h100", "md500", "fr-d700"),
         ],
         0x02,
     ),
@@ -51,6 +53,7 @@ WITHOUT = {
     "md500": {"jog_stop"},
     "fr-d700": {"coast", "reset_fault", "jog_forward", "jog_reverse", "jog_stop"},
     "fc51": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
+    "fc202": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
 }
 """The commands that a family does not have."""
 
@@ -183,7 +186,7 @@ def test_what_can_only_be_read_cannot_be_written(bench: Bench) -> None:
             assert bench.refusal(row.place, 1) == READ_ONLY.get(bench.profile.name, 0x07), name
 
 
-@pytest.mark.parametrize("family", [*RUN, "fc51"])
+@pytest.mark.parametrize("family", [*RUN, "fc51", "fc202"])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_what_a_profile_calls_a_command_is_what_the_drive_does(bench: Bench, command: str) -> None:
     if command not in bench.profile.commands():
@@ -203,7 +206,7 @@ def test_what_a_profile_calls_a_command_is_what_the_drive_does(bench: Bench, com
         assert bench.machine.frequency == pytest.approx(from_ten[1], abs=0.1)
 
 
-@pytest.mark.parametrize("family", [*RUN, "fc51"])
+@pytest.mark.parametrize("family", [*RUN, "fc51", "fc202"])
 def test_a_coasting_motor_turns_on_and_a_stopped_one_is_slowed_down(bench: Bench) -> None:
     bench.obey()
     bench.command("run_forward", 3.0)

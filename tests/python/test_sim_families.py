@@ -44,6 +44,8 @@ FAMILIES = {
     28: "yl620",
     29: "md500",
     30: "fr-d700",
+    31: "acs580",
+    32: "fc202",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -246,6 +248,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "v20",
             "acs355",
             "fc51",
+            "fc202",
             "h100",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown

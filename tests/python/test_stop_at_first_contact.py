@@ -15,9 +15,11 @@ QUESTIONS = {
     **dict.fromkeys(("vfd500", "wj200", "h100"), (0, 4)),
     **dict.fromkeys(("gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a"), (4, 75)),
     **dict.fromkeys(("gd600", "gd3000"), (4, 75)),
-    **dict.fromkeys(("eds300", "sunfar-e300", "fc51"), (5, 90)),
+    **dict.fromkeys(("eds300", "sunfar-e300", "fc202"), (5, 90)),
     # One of these is also asked for 200BH, which a YL620 has: it would turn at ten times the speed.
     **dict.fromkeys(("ms300", "vfd-e"), (6, 108)),
+    # And this one for 3F5BH, which an FC 202 has.
+    "fc51": (6, 108),
     "yl620": (4, 75),
     "md500": (5, 90),
     "fr-d700": (5, 92),
@@ -25,7 +27,9 @@ QUESTIONS = {
     **dict.fromkeys(("chf100a", "saj8000m"), (7, 120)),
     **dict.fromkeys(("atv312", "a1000"), (6, 105)),
     "v20": (8, 140),
-    "acs355": (9, 155),
+    # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there.
+    "acs355": (10, 172),
+    "acs580": (9, 155),
 }
 """Requests before the first frame that halts, and milliseconds of the line's time until it goes out, at most."""
 

@@ -47,9 +47,11 @@ SILENT_ON_CODES = [
     "eds300",
     "sunfar-e300",
     "fc51",
+    "fc202",
     "atv312",
     "v20",
     "acs355",
+    "acs580",
     "wj200",
     "h100",
     "yl620",
@@ -59,19 +61,8 @@ SILENT_ON_CODES = [
 """The families whose units refuse 2103H."""
 
 SIGNED = [
-    "fr-d700",
-    "vfd500",
-    "yl620",
-    "a1000",
-    "eds300",
-    "sunfar-e300",
-    "fc51",
-    "atv312",
-    "v20",
-    "acs355",
-    "wj200",
-    "h100",
-    "md500",
+    *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "v20"),
+    *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700"),
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -115,8 +106,11 @@ TAKEN_FOR: dict[str, list[str]] = {
     "v20": ["v20"],
     # And this one the three words of the ABB drives profile, 0000H, 0003H and 0066H.
     "acs355": ["acs355"],
-    # And this one answers C417H and 3F01H, its status word and its output frequency.
+    # And this one, beside the first two of them, 58.01: 16A8H.
+    "acs580": ["acs580"],
+    # And these answer C417H, their status word; this one 3F01H, its output frequency, and that one 3F5BH, 16-22.
     "fc51": ["fc51"],
+    "fc202": ["fc202"],
     # Of these nothing is known that they must say; a code gives another one away, or strange words and a signature.
     "gd600": NO_SIGNATURE,
     "gd600-rectifier": NO_STRANGE_WORD,

@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 30] = [
+static BUILTINS: [Builtin; 32] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -171,7 +171,9 @@ static BUILTINS: [Builtin; 30] = [
     builtin!("atv312": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("v20": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("acs355": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("acs580": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("fc51": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("fc202": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("wj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("h100": "registers.csv" "parameters.csv" "faults.csv"),
 ];

@@ -11,9 +11,11 @@
 
 mod a1000;
 mod acs355;
+mod acs580;
 mod atv312;
 mod chf100a;
 mod eds300;
+mod fc202;
 mod fc51;
 mod fr_d700;
 mod gd200a;
@@ -145,7 +147,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 30] = [
+const FAMILIES: [fn() -> Family; 32] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -172,7 +174,9 @@ const FAMILIES: [fn() -> Family; 30] = [
     atv312::atv312,
     v20::v20,
     acs355::acs355,
+    acs580::acs580,
     fc51::fc51,
+    fc202::fc202,
     fr_d700::fr_d700,
     wj200::wj200,
     h100::h100,

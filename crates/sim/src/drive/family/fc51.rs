@@ -25,13 +25,13 @@ use crate::drive::machine::{Command, Direction};
 use crate::drive::map::Access;
 use crate::drive::refusal::by_the_specification;
 
-const CONTROL_WORD: u32 = 49_999;
-const REFERENCE: u32 = 50_009;
+pub(super) const CONTROL_WORD: u32 = 49_999;
+pub(super) const REFERENCE: u32 = 50_009;
 /// The low words of 3-03 and 3-42.
 const HIGHEST_REFERENCE: u16 = 3_030;
 const RAMP_DOWN: u16 = 3_420;
 /// Counts of 1 % of the reference: 4000H are 100 %.
-const SHARE: f64 = 163.84;
+pub(super) const SHARE: f64 = 163.84;
 /// Most words of one request. Assumption.
 const MAX_WORDS: u16 = 63;
 
@@ -81,7 +81,7 @@ pub(crate) fn fc51() -> Family {
 
 /// Bits 2 to 5 are 0 for the DC brake, coasting, quick stop and frozen output; 6 starts, 7 resets as it rises, 8 jogs, 10 says
 /// that the others count, 15 reverses.
-fn control_word(before: u16, word: u16) -> Command {
+pub(super) fn control_word(before: u16, word: u16) -> Command {
     let bit = |place: u16| word & 1 << place != 0;
     let direction = if bit(15) { Direction::Reverse } else { Direction::Forward };
     match () {
