@@ -193,7 +193,9 @@ impl<'p> Rule<'p> {
     ///
     /// [`WhyNot::NoFault`], and those of [`read`](Self::read).
     pub fn fault(&self) -> Result<(), WhyNot<'p>> {
-        self.read(self.profile.role("fault").ok_or(WhyNot::NoFault)?)
+        self.read(self.profile.role("fault").ok_or(WhyNot::NoFault)?)?;
+        // A number that holds is that of the present fault while the state says so.
+        if self.profile.fault_holds() { self.state() } else { Ok(()) }
     }
 
     fn proves(&self, is_printed: bool, reason: &'p str) -> Result<(), WhyNot<'p>> {

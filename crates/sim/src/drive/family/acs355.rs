@@ -7,7 +7,7 @@
 //! - Assumption: it obeys the bus while 1001 is 10, and takes REF1 from it while 1103 is 8. 20000 counts are parameter 1105, in
 //!   tenths of a hertz, 50.0 Hz from the factory, which is the highest frequency too. A negative reference reverses.
 //! - Assumption: the status word shows operation enabled until the motor stands. It tells no direction.
-//! - Assumption: an overload is fault 9; no register at hand shows its number.
+//! - Assumption: an overload is fault 9, which 0401 shows from then on.
 //! - Assumption: it refuses what is not here with 02H, and what is out of range with 03H. A silent bus is not watched.
 
 use super::{
@@ -19,6 +19,8 @@ use crate::drive::refusal::by_the_specification;
 
 const COMMAND_SOURCE: u16 = 1000;
 const SETPOINT_SOURCE: u16 = 1102;
+/// 0401 keeps its number when the fault is reset.
+const LAST_FAULT: u16 = 400;
 const REFERENCE: u16 = 1104;
 /// 1607: 1 stores all that was set, and goes back to 0.
 const SAVE: u32 = 1606;
@@ -50,6 +52,7 @@ pub(crate) fn acs355() -> Family {
                 unit: Some(Deciding::Words(REFERENCE, vec![(600, hertz(60.0))])),
                 usual: hertz(50.0),
             }),
+            fault_history: vec![LAST_FAULT],
             handshake: Some(Handshake { idle: 0x0270, words: vec![(0x0476, 0x0231)] }),
             ..Roles::NONE
         },
@@ -81,13 +84,13 @@ const REGISTERS: &[Register] = &[
     Register::read(101, Shows::Measured(Measure::Speed, 1.0)),
     Register::read(102, Shows::Measured(Measure::Frequency, 10.0)),
     Register::read(103, Shows::Measured(Measure::Current, 10.0)),
-    Register::read(400, Shows::Zero),
 ];
 
 const PARAMETERS: &[Parameter] = &[
     Parameter::new(COMMAND_SOURCE, 0, 20, 2).at_standstill(),
     Parameter::new(SETPOINT_SOURCE, 0, 20, 1).at_standstill(),
     Parameter::new(1606, 0, 1, 0),
+    Parameter::shown(LAST_FAULT),
     Parameter::new(REFERENCE, 0, 5_999, 500),
     Parameter::new(PROFILE, 0, 2, 2),
 ];
