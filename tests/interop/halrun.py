@@ -55,6 +55,7 @@ class Session:
 
     def __init__(self, linuxcnc: Linuxcnc, folder: Path) -> None:
         self._linuxcnc = linuxcnc
+        self._loaded: set[str] = {"drivebus", "other"}
         self.log = folder / "halrun.log"
         self._output = self.log.open("w")
         self._halrun = subprocess.Popen(
@@ -72,6 +73,25 @@ class Session:
         self.type(f"loadusr -Wn {name} {self._linuxcnc.command(*words, '--name', name)}")
         self.until(lambda: self.process(name) and "ready" in self._row(name))
         return self.process(name)
+
+    def has(self, program: str) -> bool:
+        """Whether this LinuxCNC has *program*."""
+        return shutil.which(program, path=self._linuxcnc.env["PATH"]) is not None
+
+    def load_other(self, name: str, line: str) -> None:
+        """Loads somebody else's program by its *line*, and waits until it is ready."""
+        self._loaded.add(name)
+        self.type(f"loadusr -Wn {name} {line}")
+        self.until(lambda: self.process(name) and "ready" in self._row(name))
+
+    def unload(self, name: str) -> None:
+        """Ends a program, and waits until it has gone."""
+        self.halcmd("unloadusr", name)
+        self.until(lambda: not self.process(name))
+
+    def setp(self, name: str, pin: str, value: float) -> None:
+        """Sets a pin of the program of that *name*."""
+        self.halcmd("setp", f"{name}.{pin}", str(value))
 
     def type(self, line: str) -> None:
         """Types a line at the prompt."""
@@ -132,7 +152,7 @@ class Session:
 
     def close(self) -> None:
         """Leaves nothing behind, whatever became of the test."""
-        for name in ("drivebus", "other"):
+        for name in self._loaded:
             if process := self.process(name):
                 with suppress(ProcessLookupError):  # HAL shows a program for a moment after its end
                     os.kill(process, 9)

@@ -23,6 +23,9 @@ STOP = "01 06 00 00 04 7E 0B 2A"
 COAST = "01 06 00 00 04 7C 8A EB"
 RESET = "01 06 00 00 04 F6 0B 4C"
 READ_STATUS = "01 03 00 03 00 01 74 0A"
+READ_FAULT = "01 03 01 90 00 01 85 DB"
+LOOK = [READ_STATUS, READ_FAULT]
+"""0401, the last fault, counts while the status word says that it has tripped."""
 
 
 @pytest.fixture
@@ -47,7 +50,7 @@ def commanded(line: Simulator) -> list[str]:
 def test_a_start_is_these_bytes_and_no_others(line: Simulator, drive: Drive) -> None:
     drive.run(10.0)
     sent = asked(line)
-    assert sent[sent.index(READY) :] == [READY, READ_STATUS, FORWARD_10_OF_50_HZ, READ_STATUS]
+    assert sent[sent.index(READY) :] == [READY, *LOOK, FORWARD_10_OF_50_HZ, *LOOK]
     assert drive.state() is State.FORWARD
     line.advance(20.0)
     assert line.drive(1).frequency == pytest.approx(10.0, abs=0.01)

@@ -297,7 +297,9 @@ fn roles(file: &File, manifest: &Manifest, roles: &mut Roles, entries: &Entries,
     }
     if let Some(status) = &manifest.status {
         own(&status.fault, &mut roles.fault);
-        roles.fault_holds = status.fault_holds;
+        if let Some(holds) = &status.fault_holds {
+            roles.fault_holds = *holds.get_ref();
+        }
         own(&status.frequency, &mut roles.frequency);
         own(&status.setpoint, &mut roles.setpoint);
         roles.status_words = entries.names(file, &status.words, problems);

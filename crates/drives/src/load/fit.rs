@@ -22,7 +22,8 @@ pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problem
     sequence(file, profile, problems);
     if profile.fault_holds() && !(profile.state_tells_fault() && profile.role("fault").is_some()) {
         let reason = "\"fault_holds\" needs a register of the fault, and a state that says when the drive is in fault";
-        problems.add(file, 1, reason.to_owned());
+        let own = manifest.status.as_ref().and_then(|status| status.fault_holds.as_ref());
+        problems.add(file, own.map_or(1, |own| line(file, own)), reason.to_owned());
     }
 }
 

@@ -289,8 +289,7 @@ pub(super) struct Status {
     /// The present fault.
     pub(super) fault: Option<Placed<String>>,
     /// Whether it keeps its number after a reset: then it is the present fault while the state says so.
-    #[serde(default)]
-    pub(super) fault_holds: bool,
+    pub(super) fault_holds: Option<Placed<bool>>,
     /// The frequency at the output.
     pub(super) frequency: Option<Placed<String>>,
     /// The frequency setpoint in force.

@@ -7,6 +7,7 @@
 //!
 //! - Assumption: A001 and A002 are set so that the bus is obeyed. They are not simulated, nor are the other parameters.
 //! - Assumption: exceptions are those of the Modbus specification. Coils that are not here are refused with 02H.
+//! - Assumption: coils 0012h to 0017h and 0019h are there and 0. LinuxCNC's wj200_vfd reads them with those beside them.
 //! - Assumption: the direction of a motor that runs is changed at once, and a reset is carried out by each 1.
 
 use drivebus_rtu::Table;
@@ -49,7 +50,9 @@ pub(crate) fn wj200() -> Family {
 fn registers() -> Vec<Register> {
     let coil = |address, bits| Register::read(spot(Table::Coil, address), Shows::Bits(bits));
     let measured = |address, measure, counts| Register::read(address, Shows::Measured(measure, counts));
-    vec![
+    let unknown =
+        (0x0011..=0x0016).chain([0x0018]).map(|address| Register::read(spot(Table::Coil, address), Shows::Zero));
+    let known = vec![
         Register::set(RUN, Range::Words(0, 1)),
         Register::set(DIRECTION, Range::Words(0, 1)),
         Register::set(RESET, Range::Words(0, 1)),
@@ -72,5 +75,6 @@ fn registers() -> Vec<Register> {
         Register::read(0x1003, Shows::State([1, 2, 0, 0], Vec::new().into())),
         measured(0x1010, Measure::Voltage, 10.0),
         measured(0x1025, Measure::BusVoltage, 10.0),
-    ]
+    ];
+    known.into_iter().chain(unknown).collect()
 }

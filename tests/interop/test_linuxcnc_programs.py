@@ -1,0 +1,172 @@
+"""`drivebus hal` beside the programs that LinuxCNC has for drives of the same families: one HAL script, two drives.
+
+Each program has a simulated drive of its own, behind a pseudo-terminal of its own. The judge is that drive: what it was
+told, which way its motor turns and how fast, and whether it stands in the end. Each word is typed from the page that
+its comment names; what the other program sends was not looked up, but heard.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+import drivebus
+from drivebus.sim import SimulatedDrive, Simulator
+
+from .halrun import Session, wait_until
+from .test_linuxcnc import UNDER_TEST, linuxcnc, session
+
+__all__ = ["linuxcnc", "session"]
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="LinuxCNC is for Linux")
+
+BAUD = 19_200
+RPM_PER_HZ = 60
+"""A motor of two poles, as each program is told, too."""
+
+Place = int
+
+
+class Program(NamedTuple):
+    """A program of LinuxCNC's own, and the family that it drives.
+
+    Attributes:
+        family: As drivebus calls it.
+        line: How it is loaded; `{port}` is where its drive is, `{ini}` a file with that.
+        name: What HAL calls it.
+        speed: Its pin for the speed, in revolutions a minute, or in hertz where *counts_hertz*.
+        starts: Its pin that starts and stops.
+        enables: Its pin that lets it, if it has one.
+        run: The word that runs the motor forward: where, and which.
+        setpoint: Where the speed is set.
+        counts: The words for 2.5 Hz and for 1.5 Hz, in the scale of the family.
+        stops: The words by which it may be stopped: of drivebus, and of the program.
+        settings: Pins that are set once: the address of the unit.
+    """
+
+    family: str
+    line: str
+    name: str
+    speed: str
+    starts: str
+    enables: str | None
+    run: tuple[Place, int]
+    setpoint: Place
+    counts: tuple[int, int]
+    stops: tuple[tuple[Place, int], tuple[Place, int]]
+    settings: tuple[tuple[str, int], ...] = ()
+    counts_hertz: bool = False
+
+
+USUAL = "-S 3000 -F 50 -f 1 -d {port} -r 19200 -p none -s 1 -t 1"
+
+PROGRAMS = {
+    # A Delta drive is stopped by bit 0 of 2000H (VFD-ED manual, p. 440); the program keeps the bits of the direction.
+    "vfdb_vfd": Program(
+        "vfd-e", "vfdb_vfd -n other -I {ini}", "other", "speed-command", "spindle-on", "enable",
+        (0x2000, 0x12), 0x2001, (250, 150), ((0x2000, 0x01), (0x2000, 0x11)),
+    ),
+    # SVD-PS, of the class of the MD500, whose 10000 counts are F0-10: drivebus stops by 6, along the ramp, the program
+    # by 5, at which a drive of this class lets its motor coast (MD500 manual, p. 226).
+    "svd-ps_vfd": Program(
+        "md500", f"svd-ps_vfd {USUAL}", "svd-ps_vfd", "speed-cmd", "spindle-on", None,
+        (0x2000, 1), 0x1000, (500, 300), ((0x2000, 6), (0x2000, 5)),
+    ),
+    # The run is a coil, and beside it stands another for the direction (WJ200 manual, p. B-24; 0001h is 0000H on the wire).
+    "wj200_vfd": Program(
+        "wj200", "wj200_vfd --device {port} --baud 19200 --parity n --databits 8 --stopbits 1 names=wj200_vfd",
+        "wj200_vfd", "commanded-frequency", "run", "enable",
+        (0x0000, 1), 0x0001, (250, 150), ((0x0000, 0), (0x0000, 0)), (("mbslaveaddr", 1),), counts_hertz=True,
+    ),
+}  # fmt: skip
+
+
+class Shown(NamedTuple):
+    """What a drive did under one program."""
+
+    states: list[tuple[str, float]]
+    """Its state, and its frequency, behind each step of the script."""
+
+    told: set[tuple[Place, int]]
+
+
+def carried_out(machine: SimulatedDrive, set_: Callable[[str, float], None], rpm: bool) -> Shown:
+    """The script: on at 2.5 Hz, then 1.5 Hz, then off; *set_* sets a pin by what it is for."""
+    states: list[tuple[str, float]] = []
+    scale = RPM_PER_HZ if rpm else 1
+
+    def until(state: str, hertz: float) -> None:
+        wait_until(lambda: (machine.state, round(machine.frequency, 2)) == (state, hertz), lambda: machine)
+        states.append((machine.state, round(machine.frequency, 2)))
+
+    machine.take_writes()
+    set_("enable", 1)
+    set_("speed", 2.5 * scale)
+    set_("on", 1)
+    until("forward", 2.5)
+    set_("speed", 1.5 * scale)
+    until("forward", 1.5)
+    set_("on", 0)
+    until("stopped", 0.0)
+    return Shown(states, {(place, word) for _, place, word in machine.take_writes()})
+
+
+@pytest.fixture
+def line(request: pytest.FixtureRequest) -> Iterator[Simulator]:
+    """A drive of the family that obeys the bus."""
+    family = PROGRAMS[request.node.callspec.params["name"]].family
+    with Simulator({1: family}, parity="N", baudrate=BAUD) as simulator:
+        yield simulator
+
+
+def prepare(simulator: Simulator, program: Program) -> SimulatedDrive:
+    """Has the drive obey the bus, as its keypad would."""
+    with drivebus.Bus(simulator.port, parity="N", baudrate=BAUD) as bus:
+        bus.drive(1, program.family, unverified=True).prepare_control(store=True)
+    return simulator.drive(1)
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_the_same_script_makes_the_motor_do_the_same(
+    name: str, session: Session, line: Simulator, tmp_path: Path
+) -> None:
+    program = PROGRAMS[name]
+    if not session.has(name):
+        pytest.skip(f"this LinuxCNC has no {name}")
+
+    machine = prepare(line, program)
+    words = ["--port", line.port, *UNDER_TEST, "--baud", str(BAUD), "--profile", program.family]
+    session.load("drivebus", *words, "hal", "--rpm-per-hz", str(RPM_PER_HZ))
+    pins = {"enable": "enable", "speed": "speed-command", "on": "spindle-on"}
+    ours = carried_out(machine, lambda pin, value: session.setp("drivebus", pins[pin], value), rpm=True)
+    session.unload("drivebus")
+
+    with Simulator({1: program.family}, parity="N", baudrate=BAUD) as simulator:
+        machine = prepare(simulator, program)
+        ini = tmp_path / "drive.ini"
+        ini.write_text(
+            f"[VFD-B]\nDEVICE={simulator.port}\nBAUD={BAUD}\nBITS=8\nPARITY=None\nSTOPBITS=1\nTARGET=1\n"
+            "POLLCYCLES=2\nRECONNECT_DELAY=1\nMOTOR_HZ=50\nMOTOR_RPM=3000\n"
+        )
+        session.load_other(program.name, program.line.format(port=simulator.port, ini=ini))
+        for pin, value in program.settings:
+            session.setp(program.name, pin, value)
+        others = {"enable": program.enables, "speed": program.speed, "on": program.starts}
+
+        def set_(pin: str, value: float) -> None:
+            known = others[pin]
+            if known is not None:
+                session.setp(program.name, known, value)
+
+        theirs = carried_out(machine, set_, rpm=not program.counts_hertz)
+        session.unload(program.name)
+
+    assert ours.states == theirs.states
+    moves = {program.run, *((program.setpoint, count) for count in program.counts)}
+    assert ours.told == {*moves, program.stops[0]}
+    # What it sends beside that, at rest or with a setpoint of nothing, moves no motor.
+    assert moves | {program.stops[1]} <= theirs.told
