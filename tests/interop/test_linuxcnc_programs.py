@@ -15,6 +15,7 @@ from typing import NamedTuple
 import pytest
 
 import drivebus
+from drivebus import tables
 from drivebus.sim import SimulatedDrive, Simulator
 
 from .halrun import Session, wait_until
@@ -41,7 +42,7 @@ class Program(NamedTuple):
         speed: Its pin for the speed, in revolutions a minute, or in hertz where *counts_hertz*.
         starts: Its pin that starts and stops.
         enables: Its pin that lets it, if it has one.
-        run: The word that runs the motor forward: where, and which.
+        runs: The words that run the motor forward, the run itself first: where, and which.
         setpoint: Where the speed is set.
         counts: The words for 2.5 Hz and for 1.5 Hz, in the scale of the family.
         stops: The words by which it may be stopped: of drivebus, and of the program.
@@ -54,7 +55,7 @@ class Program(NamedTuple):
     speed: str
     starts: str
     enables: str | None
-    run: tuple[Place, int]
+    runs: tuple[tuple[Place, int], ...]
     setpoint: Place
     counts: tuple[int, int]
     stops: tuple[tuple[Place, int], tuple[Place, int]]
@@ -62,25 +63,27 @@ class Program(NamedTuple):
     counts_hertz: bool = False
 
 
+RUN, DIRECTION = tables.place("coil", 0x0000), tables.place("coil", 0x0001)
+
 USUAL = "-S 3000 -F 50 -f 1 -d {port} -r 19200 -p none -s 1 -t 1"
 
 PROGRAMS = {
     # A Delta drive is stopped by bit 0 of 2000H (VFD-ED manual, p. 440); the program keeps the bits of the direction.
     "vfdb_vfd": Program(
         "vfd-e", "vfdb_vfd -n other -I {ini}", "other", "speed-command", "spindle-on", "enable",
-        (0x2000, 0x12), 0x2001, (250, 150), ((0x2000, 0x01), (0x2000, 0x11)),
+        ((0x2000, 0x12),), 0x2001, (250, 150), ((0x2000, 0x01), (0x2000, 0x11)),
     ),
     # SVD-PS, of the class of the MD500, whose 10000 counts are F0-10: drivebus stops by 6, along the ramp, the program
     # by 5, at which a drive of this class lets its motor coast (MD500 manual, p. 226).
     "svd-ps_vfd": Program(
         "md500", f"svd-ps_vfd {USUAL}", "svd-ps_vfd", "speed-cmd", "spindle-on", None,
-        (0x2000, 1), 0x1000, (500, 300), ((0x2000, 6), (0x2000, 5)),
+        ((0x2000, 1),), 0x1000, (500, 300), ((0x2000, 6), (0x2000, 5)),
     ),
-    # The run is a coil, and beside it stands another for the direction (WJ200 manual, p. B-24; 0001h is 0000H on the wire).
+    # The run is a coil, and beside it stands another for the direction (WJ200 manual, p. B-24).
     "wj200_vfd": Program(
         "wj200", "wj200_vfd --device {port} --baud 19200 --parity n --databits 8 --stopbits 1 names=wj200_vfd",
         "wj200_vfd", "commanded-frequency", "run", "enable",
-        (0x0000, 1), 0x0001, (250, 150), ((0x0000, 0), (0x0000, 0)), (("mbslaveaddr", 1),), counts_hertz=True,
+        ((RUN, 1), (DIRECTION, 0)), 0x0001, (250, 150), ((RUN, 0), (RUN, 0)), (("mbslaveaddr", 1),), counts_hertz=True,
     ),
 }  # fmt: skip
 
@@ -162,11 +165,11 @@ def test_the_same_script_makes_the_motor_do_the_same(
             if known is not None:
                 session.setp(program.name, known, value)
 
+        # Not each of them ends when it is told to: the session ends it.
         theirs = carried_out(machine, set_, rpm=not program.counts_hertz)
-        session.unload(program.name)
 
     assert ours.states == theirs.states
-    moves = {program.run, *((program.setpoint, count) for count in program.counts)}
-    assert ours.told == {*moves, program.stops[0]}
-    # What it sends beside that, at rest or with a setpoint of nothing, moves no motor.
-    assert moves | {program.stops[1]} <= theirs.told
+    setpoints = {(program.setpoint, count) for count in program.counts}
+    assert ours.told == {*program.runs, *setpoints, program.stops[0]}
+    # What else it sends, at rest, or of a direction that is so already, moves no motor.
+    assert {program.runs[0], *setpoints, program.stops[1]} <= theirs.told

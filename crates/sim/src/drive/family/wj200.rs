@@ -7,7 +7,7 @@
 //!
 //! - Assumption: A001 and A002 are set so that the bus is obeyed. They are not simulated, nor are the other parameters.
 //! - Assumption: exceptions are those of the Modbus specification. Coils that are not here are refused with 02H.
-//! - Assumption: coils 0012h to 0017h and 0019h are there and 0. LinuxCNC's wj200_vfd reads them with those beside them.
+//! - Assumption: coils 0012h to 0017h and 0019h, and register 1019h, are there and 0: LinuxCNC's wj200_vfd reads them.
 //! - Assumption: the direction of a motor that runs is changed at once, and a reset is carried out by each 1.
 
 use drivebus_rtu::Table;
@@ -74,6 +74,7 @@ fn registers() -> Vec<Register> {
         measured(0x1002, Measure::Current, 100.0),
         Register::read(0x1003, Shows::State([1, 2, 0, 0], Vec::new().into())),
         measured(0x1010, Measure::Voltage, 10.0),
+        Register::read(0x1018, Shows::Zero),
         measured(0x1025, Measure::BusVoltage, 10.0),
     ];
     known.into_iter().chain(unknown).collect()
