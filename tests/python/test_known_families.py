@@ -96,7 +96,7 @@ def test_a_stop_looks_where_the_family_was_known_and_goes_out(simulator: drivebu
 def test_an_older_goodrive_is_kept_by_its_code(family: str) -> None:
     """010DH, 0106H and 010BH are each one family's, which the next stop finds at once. 5 stops: GD10 manual, p. 88."""
     with drivebus.Simulator({1: family}, transport="pty") as simulator:
-        assert run(simulator, "scan", "--units", "1").exit_code == 0
+        assert run(simulator, "scan", "--units", "1", "--timeout", "2").exit_code == 0
         assert known_family(simulator.port, 1) == family
         before = len(simulator.line.trace())
         run(simulator, "stop")
