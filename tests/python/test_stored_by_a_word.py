@@ -13,6 +13,8 @@ from click.testing import CliRunner, Result
 import drivebus
 from drivebus import Bus, Drive, Simulator, Unconfirmed
 from drivebus.cli.app import cli
+from drivebus.operations import network_rights
+from drivebus.profile.evidence import Evidence
 
 CMI = 8504
 RAMPS = {"ACC": 5.0, "dEC": 7.0}
@@ -154,3 +156,15 @@ def test_an_acs355_stores_by_1607_for_who_trusts_that() -> None:
         assert line.drive(1).register(0x0646) == 0
         line.drive(1).power_cycle()
         assert line.drive(1).register(0x044E) == 8
+
+
+def test_whoever_writes_over_the_network_wears_it_by_the_word_alone(drive: Drive) -> None:
+    """A gateway lets what wears the memory happen seldom: a parameter does not, CMI does."""
+    evidence = Evidence(drive.profile, 1, True)
+    told = {
+        name: means
+        for *_, means, _, name, _ in network_rights.of_drive(
+            evidence, ["ACC", "set_frequency", "extended_control_word"], []
+        )
+    }
+    assert told == {"ACC": "sets", "set_frequency": "sets", "extended_control_word": "wears"}

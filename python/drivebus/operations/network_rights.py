@@ -159,9 +159,14 @@ def _register(evidence: Evidence, name: object) -> Iterator[Writable]:
         means = "moves"
     shown = profile.read_back(name)
     shown_at = shown if shown is not None and known.kind == "parameter" and shown <= 0xFFFF else None
-    if known.kind != "parameter":
+    memory = profile.memory()
+    stores = None if memory is None else memory.store_register
+    if stores is not None and stores in {known.name, known.code}:
+        yield _at(place, None, "wears", called)
+    elif known.kind != "parameter" or stores is not None:
+        # What stays in RAM until all is stored wears nothing by itself.
         yield _at(place, None, means, called, shown_at=shown_at)
-    elif profile.memory() is None:
+    elif memory is None:
         yield _at(place, None, means if means == "moves" else "wears", called, shown_at=shown_at)
     else:
         in_ram, kept = profile.address(name, store=False), profile.address(name, store=True)
