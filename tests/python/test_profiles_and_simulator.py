@@ -37,7 +37,7 @@ READ_ONLY = {
     **dict.fromkeys(
         [
             *("ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
-            *("acs580", "fc202", "wj200", "h100", "md500", "fr-d700"),
+            *("acs580", "atv12", "fc202", "wj200", "h100", "md500", "fr-d700"),
         ],
         0x02,
     ),

@@ -46,6 +46,7 @@ FAMILIES = {
     30: "fr-d700",
     31: "acs580",
     32: "fc202",
+    33: "atv12",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -245,6 +246,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "eds300",
             "sunfar-e300",
             "atv312",
+            "atv12",
             "v20",
             "acs355",
             "fc51",

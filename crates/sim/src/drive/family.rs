@@ -12,6 +12,7 @@
 mod a1000;
 mod acs355;
 mod acs580;
+mod atv12;
 mod atv312;
 mod chf100a;
 mod eds300;
@@ -147,7 +148,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 32] = [
+const FAMILIES: [fn() -> Family; 33] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -171,6 +172,7 @@ const FAMILIES: [fn() -> Family; 32] = [
     saj8000m::saj8000m,
     eds300::eds300,
     sunfar::e300,
+    atv12::atv12,
     atv312::atv312,
     v20::v20,
     acs355::acs355,
