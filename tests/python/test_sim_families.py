@@ -47,6 +47,7 @@ FAMILIES = {
     31: "acs580",
     32: "fc202",
     33: "atv12",
+    34: "atv600",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -247,6 +248,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "sunfar-e300",
             "atv312",
             "atv12",
+            "atv600",
             "v20",
             "acs355",
             "fc51",

@@ -193,6 +193,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "fc202",
         "atv312",
         "atv12",
+        "atv600",
         "v20",
         "acs355",
         "acs580",
