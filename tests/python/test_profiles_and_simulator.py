@@ -37,7 +37,7 @@ READ_ONLY = {
     **dict.fromkeys(
         [
             *("ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
-            *("acs580", "fc202", "wj200", "h100", "md500", "fr-d700"),
+            *("acs580", "atv12", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700"),
         ],
         0x02,
     ),
@@ -49,6 +49,7 @@ OUT_OF_RANGE = dict.fromkeys(
 """And a value that is out of range, where it is not their 04H."""
 
 WITHOUT = {
+    "atv600": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
     "vfd500": {"jog_stop"},
     "md500": {"jog_stop"},
     "fr-d700": {"coast", "reset_fault", "jog_forward", "jog_reverse", "jog_stop"},

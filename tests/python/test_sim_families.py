@@ -46,6 +46,8 @@ FAMILIES = {
     30: "fr-d700",
     31: "acs580",
     32: "fc202",
+    33: "atv12",
+    34: "atv600",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -245,6 +247,8 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "eds300",
             "sunfar-e300",
             "atv312",
+            "atv12",
+            "atv600",
             "v20",
             "acs355",
             "fc51",

@@ -49,6 +49,8 @@ SILENT_ON_CODES = [
     "fc51",
     "fc202",
     "atv312",
+    "atv12",
+    "atv600",
     "v20",
     "acs355",
     "acs580",
@@ -61,7 +63,7 @@ SILENT_ON_CODES = [
 """The families whose units refuse 2103H."""
 
 SIGNED = [
-    *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "v20"),
+    *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "v20"),
     *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700"),
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
@@ -100,8 +102,11 @@ TAKEN_FOR: dict[str, list[str]] = {
     "a1000": ["a1000"],
     "eds300": ["eds300"],
     "sunfar-e300": ["sunfar-e300"],
-    # And this one ETA, rFr and CMD: 0C81H, 0C82H and 2135H.
+    # And these rFr and CMD: 0C82H and 2135H; this one Otr, 0C85H, and that one HMIS, 0CA8H.
     "atv312": ["atv312"],
+    "atv12": ["atv12"],
+    # And this one both, and 3E80H, a word for pumps.
+    "atv600": ["atv600"],
     # And this one STW, ZSW and the output frequency: 0063H, 006DH and 0017H.
     "v20": ["v20"],
     # And this one the three words of the ABB drives profile, 0000H, 0003H and 0066H.

@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 32] = [
+static BUILTINS: [Builtin; 34] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -168,7 +168,9 @@ static BUILTINS: [Builtin; 32] = [
     builtin!("eds300": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("sunfar-e300": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("fr-d700": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("atv12": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("atv312": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("atv600": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("v20": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("acs355": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("acs580": "registers.csv" "parameters.csv" "faults.csv"),

@@ -91,6 +91,10 @@ fn builtin_profiles_go_by_name() {
 fn builtin_profiles_go_by_what_their_drives_are_called() {
     for (called, name) in [
         ("Schneider Altivar 312", "atv312"),
+        ("Altivar 12", "atv12"),
+        ("ATV 12", "atv12"),
+        ("Altivar 600", "atv600"),
+        ("ATV630", "atv600"),
         ("altivar-312", "atv312"),
         ("ATV 312", "atv312"),
         ("VFD-MS300", "ms300"),

@@ -200,7 +200,9 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
     let expected = [
         ("a1000", 21),
         ("acs355", 12),
-        ("atv312", 33),
+        ("atv12", 50),
+        ("atv312", 34),
+        ("atv600", 60),
         ("acs580", 15),
         ("chf100a", 27),
         ("wj200", 20),

@@ -12,7 +12,9 @@
 mod a1000;
 mod acs355;
 mod acs580;
+mod atv12;
 mod atv312;
+mod atv600;
 mod chf100a;
 mod eds300;
 mod fc202;
@@ -147,7 +149,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 32] = [
+const FAMILIES: [fn() -> Family; 34] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -171,7 +173,9 @@ const FAMILIES: [fn() -> Family; 32] = [
     saj8000m::saj8000m,
     eds300::eds300,
     sunfar::e300,
+    atv12::atv12,
     atv312::atv312,
+    atv600::atv600,
     v20::v20,
     acs355::acs355,
     acs580::acs580,

@@ -192,6 +192,8 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "fc51",
         "fc202",
         "atv312",
+        "atv12",
+        "atv600",
         "v20",
         "acs355",
         "acs580",

@@ -9,6 +9,7 @@
 //! - Assumption: 80H resets a fault, whatever the word before it. A fault and its reset lead back to the beginning.
 //! - Assumption: bits of CMI other than 1 do nothing. What is stored is there at once, in any state of the motor.
 //! - Assumption: CMD takes these words only, and 02H (quick stop) is none of them. Other words are out of range.
+//! - Assumption: a command at 8601 is obeyed without the words before it.
 //! - Assumption: it obeys the bus while Fr1 is 164, and is at AI1 from the factory: the setpoint is then that of the keypad.
 //! - Assumption: 50.0 Hz is the frequency in FrS, HSP and at the keypad.
 
@@ -22,6 +23,8 @@ use crate::drive::refusal::by_the_specification;
 const COMMAND: u32 = 8501;
 /// CMI: bit 1 stores all that was set in EEPROM, and goes back to 0 (p. 20).
 const EXTENDED_COMMAND: u32 = 8504;
+/// CMDD: the same, for a setpoint in rpm (p. 16).
+const SPEED_COMMAND: u32 = 8601;
 const MAX_FREQUENCY: u16 = 3103;
 const HIGH_SPEED: u16 = 3104;
 const SETPOINT_SOURCE: u16 = 8413;
@@ -46,7 +49,7 @@ pub(crate) fn atv312() -> Family {
         command: Some(COMMAND),
         commands: COMMANDS.to_vec(),
         control_word: None,
-        elsewhere: Vec::new(),
+        elsewhere: COMMANDS.iter().map(|&(word, command)| (SPEED_COMMAND, word, command)).collect(),
         registers: REGISTERS.to_vec(),
         parameters: PARAMETERS.to_vec(),
         factory: &[],
@@ -100,6 +103,7 @@ const REGISTERS: &[Register] = &[
     Register::set(8501, Range::Words(0, u16::MAX)),
     Register::set(8502, Range::Speed),
     Register::set(EXTENDED_COMMAND, Range::Words(0, u16::MAX)),
+    Register::set(SPEED_COMMAND, Range::Words(0, u16::MAX)),
     Register::read(8606, Shows::Fault),
     Register::read(9630, Shows::Zero),
 ];

@@ -1,0 +1,138 @@
+//! Schneider Altivar 12: led through the states of CiA 402 by the bits of CMD (8501), which ETA (3201) shows.
+//!
+//! From the maker's list (Schneider BBV51917, 1.4IE05) and, quoted by PortDock and mbmap-library, its Modbus manual (BBV28590): 06H,
+//! 07H and then 0FH; ETA masked shows 50H, 31H, 33H and 37H, as its bit 4 is always 1, and bit 9 is 1 while the bus commands. 080FH
+//! runs in reverse. ACC and dEC are 3.0 s from the factory, and count from 0 to FrS. LFt (7121) has numbers of its own, dP0 (7200) and
+//! the four behind it are the last faults.
+//!
+//! - Assumption: it stands at Stt = rMP, and somebody has set SLL to 0, so that a silent bus does nothing; from the factory it is 1.
+//! - Assumption: bit 9 of ETA is always 1. 06H coasts a motor that runs, as an Altivar 312 does.
+//! - Assumption: 80H resets a fault, whatever the word before it. A fault and its reset lead back to the beginning. LFt keeps its number.
+//! - Assumption: bits of CMI other than 1 do nothing. What is stored is there at once, in any state of the motor.
+//! - Assumption: CMD takes these words only, and 02H (quick stop) and the halt (bit 8) are none of them. Other words are out of range.
+//! - Assumption: a command at 8601, or at 12761, which passes it on to CMD, is obeyed without the words before it.
+//! - Assumption: it obeys the bus while Fr1 is 164, and is at AI1 from the factory: the setpoint is then that of the keypad.
+//! - Assumption: 50.0 Hz is the frequency in FrS, HSP and at the keypad, tFr is 60.0 Hz. LFrd (8602) moves nothing.
+//! - Assumption: it refuses what is not in the list with 02H. HMIS shows rdY (2) or FLt (23) and nothing else.
+
+use super::{
+    Bit, Bounds, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, Parameter, Range, Register, Roles,
+    Scaled, Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
+};
+use crate::drive::machine::{Command, Direction};
+use crate::drive::refusal::by_the_specification;
+
+const COMMAND: u32 = 8501;
+/// CMI: bit 1 stores all that was set in EEPROM, and goes back to 0.
+const EXTENDED_COMMAND: u32 = 8504;
+const SPEED_COMMAND: u32 = 8601;
+/// nC1, which nCA1 leads to CMD from the factory.
+const SCANNER: u32 = 12761;
+const MAX_FREQUENCY: u16 = 3103;
+const HIGH_SPEED: u16 = 3104;
+const SETPOINT_SOURCE: u16 = 8413;
+const TIMEOUT: u16 = 6005;
+const ON_SILENCE: u16 = 7010;
+const ACCELERATION: u16 = 9001;
+const DECELERATION: u16 = 9002;
+/// dP0: the fault that LFt shows, too.
+const LAST_FAULT: u16 = 7200;
+/// In Fr1.
+const MODBUS: u16 = 164;
+
+pub(crate) fn atv12() -> Family {
+    let also = |place| COMMANDS.iter().map(move |&(word, command)| (place, word, command));
+    Family {
+        name: "atv12".into(),
+        kind: Kind::Inverter,
+        functions: vec![0x03, 0x06, 0x10],
+        max_words: 63,
+        across_groups: true,
+        exception: by_the_specification,
+        memory: Memory::RamUntil(EXTENDED_COMMAND, 0x0002),
+        identification: 0,
+        command: Some(COMMAND),
+        commands: COMMANDS.to_vec(),
+        control_word: None,
+        elsewhere: also(SPEED_COMMAND).chain(also(SCANNER)).collect(),
+        registers: REGISTERS.to_vec(),
+        parameters: PARAMETERS.to_vec(),
+        factory: &[],
+        capped: &[],
+        roles: Roles {
+            obeys: vec![(SETPOINT_SOURCE, MODBUS)],
+            speed: Some(Speed { register: 8502, unit: None, usual: SPEED }),
+            max_frequency: Some(Scaled::tenths(MAX_FREQUENCY)),
+            upper_frequency: Some(Scaled::tenths(HIGH_SPEED)),
+            acceleration: Some(Scaled::tenths(ACCELERATION)),
+            deceleration: Some(Scaled::tenths(DECELERATION)),
+            bus_timeout: Some(Scaled::tenths(TIMEOUT)),
+            on_silence: Some(Silence { parameter: ON_SILENCE, words: vec![(1, OnSilence::Trip)] }),
+            fault_history: (LAST_FAULT..LAST_FAULT + 5).collect(),
+            handshake: Some(Handshake { idle: 0x0250, words: vec![(0x06, 0x0231), (0x07, 0x0233)] }),
+            ..Roles::NONE
+        },
+        delay: USUAL_DELAY,
+        max_hertz: USUAL_MAX_HZ,
+        faults: Faults { overload: Some(17), silent_bus: Some(5) },
+    }
+}
+
+/// In tenths of a hertz; a negative one turns the other way (assumed).
+const SPEED: SpeedScale =
+    SpeedScale { unit: SpeedUnit::Hertz, counts: 10.0, bounds: Bounds { signed: true, ..Bounds::new(-4_000, 4_000) } };
+
+const COMMANDS: &[(u16, Command)] = &[
+    (0x0000, Command::Coast),
+    (0x0006, Command::Coast),
+    (0x0007, Command::Stop),
+    (0x000F, Command::Run(Direction::Forward)),
+    (0x080F, Command::Run(Direction::Reverse)),
+    (0x0080, Command::ResetFault),
+];
+
+const ANYTHING: Range = Range::Words(0, u16::MAX);
+
+const REGISTERS: &[Register] = &[
+    Register::read(3201, Shows::State([0x0237, 0x8237, 0x0250, 0x0218], std::borrow::Cow::Borrowed(&[]))),
+    Register::read(3202, Shows::Measured(Measure::SignedFrequency, 10.0)),
+    Register::read(3203, Shows::Measured(Measure::Setpoint, 10.0)),
+    Register::read(3204, Shows::Measured(Measure::Current, 10.0)),
+    Register::read(3206, Shows::bits(&[Bit::Running(4)])),
+    Register::read(3207, Shows::Zero),
+    Register::read(3209, Shows::Zero),
+    Register::read(3211, Shows::Measured(Measure::Power, 100.0)),
+    Register::read(3240, Shows::bits(&[Bit::Either { flag: Flag::Ready, low: 0, yes: 2, no: 23 }])),
+    Register::read(
+        7121,
+        Shows::WrittenIf { parameter: LAST_FAULT, is: 0, register: 7121, otherwise: Some(LAST_FAULT) },
+    ),
+    Register::read(8441, Shows::bits(&[Bit::Either { flag: Flag::Obeying, low: 0, yes: 8, no: 1 }])),
+    Register::read(8442, Shows::bits(&[Bit::Either { flag: Flag::Obeying, low: 0, yes: 8, no: 1 }])),
+    Register::set(8501, ANYTHING),
+    Register::set(8502, Range::Speed),
+    Register::set(EXTENDED_COMMAND, ANYTHING),
+    Register::set(SPEED_COMMAND, ANYTHING),
+    Register::set(8602, ANYTHING),
+    Register::read(8604, Shows::Measured(Measure::Speed, 1.0)),
+    Register::read(9630, Shows::Zero),
+    Register::set(SCANNER, ANYTHING),
+    Register::set(12762, ANYTHING),
+    Register::set(12763, ANYTHING),
+    Register::set(12764, ANYTHING),
+];
+
+const PARAMETERS: &[Parameter] = &[
+    Parameter::new(TIMEOUT, 1, 300, 100).at_standstill(),
+    Parameter::new(ON_SILENCE, 0, 4, 0).at_standstill(),
+    Parameter::new(MAX_FREQUENCY, 100, 4_000, 600).at_standstill(),
+    Parameter::new(HIGH_SPEED, 0, 4_000, 500).not_above(MAX_FREQUENCY),
+    Parameter::new(SETPOINT_SOURCE, 0, 183, 1).at_standstill(),
+    Parameter::new(ACCELERATION, 0, 9_999, 30),
+    Parameter::new(DECELERATION, 0, 9_999, 30),
+    Parameter::shown(7200),
+    Parameter::shown(7201),
+    Parameter::shown(7202),
+    Parameter::shown(7203),
+    Parameter::shown(7204),
+];
