@@ -111,6 +111,18 @@ MAKERS = [
         sure=True,
         forward_alone="10 00 01 00 01 02 00 01",
     ),
+    # The first frame of its manual's example, but for the frequency.
+    Maker(
+        "j1000",
+        variants={"speed_unit": "Hz"},
+        forward=("10 00 01 00 02 04 00 01 07 d0",),
+        reverse="10 00 01 00 01 02 00 02",
+        stop="10 00 01 00 01 02 00 00",
+        reset="10 00 01 00 01 02 00 08",
+        fault=8,
+        unverified=True,
+        forward_alone="10 00 01 00 01 02 00 01",
+    ),
     Maker(
         "saj8000m",
         hertz=None,
@@ -310,7 +322,7 @@ class TestDelta:
         asked = [data[2:4].hex() for _, who, data in line.line.trace() if who == "master" and data[1] == 0x03]
         assert list(dict.fromkeys(asked)) == [
             *("2103", "1900", "2104", "2106", "200b", "3000"),
-            *("2108", "7000", "004b", "2180", "d000", "045c", "0c81", "006d", "0003", "c417", "1003"),
+            *("2108", "7000", "004b", "0020", "2180", "d000", "045c", "0c81", "006d", "0003", "c417", "1003"),
         ]
 
     @pytest.mark.parametrize(("hertz", "word"), [(4.16, 0x01A0), (2.64, 0x0108), (2.66, 0x010A)])

@@ -46,6 +46,7 @@ FAMILIES = {
     30: "fr-d700",
     31: "acs580",
     32: "fc202",
+    33: "j1000",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 

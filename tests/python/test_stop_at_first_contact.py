@@ -26,6 +26,7 @@ QUESTIONS = {
     # An MD500 has its setpoint where these take their commands, and is asked for 7000H.
     **dict.fromkeys(("chf100a", "saj8000m"), (7, 120)),
     **dict.fromkeys(("atv312", "a1000"), (6, 105)),
+    "j1000": (7, 125),
     "v20": (8, 140),
     # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there.
     "acs355": (10, 172),

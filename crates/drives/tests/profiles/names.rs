@@ -97,6 +97,8 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("Delta VFD-E", "vfd-e"),
         ("vfd-el", "vfd-e"),
         ("Mitsubishi FR-D700", "fr-d700"),
+        ("Yaskawa J1000", "j1000"),
+        ("JZA", "j1000"),
         ("FR-D740", "fr-d700"),
         ("fr e740", "fr-d700"),
         ("Inovance MD500", "md500"),

@@ -25,6 +25,7 @@ mod gd350;
 mod gd600;
 mod h100;
 mod handshake;
+mod j1000;
 mod md500;
 mod ms300;
 pub(crate) mod own;
@@ -120,6 +121,7 @@ pub(crate) enum Memory {
     /// Every write is kept in EEPROM; there is no address with such a bit.
     EepromOnly,
     /// Every write goes to RAM, until the word at this address has one of these bits: that stores all, and the bits go back to 0.
+    /// Where there are none, any word that is written there stores all.
     RamUntil(u32, u16),
 }
 
@@ -147,7 +149,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 32] = [
+const FAMILIES: [fn() -> Family; 33] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -168,6 +170,7 @@ const FAMILIES: [fn() -> Family; 32] = [
     yl620::yl620,
     md500::md500,
     a1000::a1000,
+    j1000::j1000,
     saj8000m::saj8000m,
     eds300::eds300,
     sunfar::e300,
