@@ -38,7 +38,7 @@ READ_ONLY = {
     **dict.fromkeys(
         [
             *("ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
-            *("acs580", "fc202", "wj200", "h100", "md500", "fr-d700"),
+            *("acs580", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15"),
         ],
         0x02,
     ),
@@ -47,7 +47,20 @@ READ_ONLY = {
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
 OUT_OF_RANGE = {
     **dict.fromkeys(
-        ["ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "v20", "wj200", "h100", "md500", "fr-d700"],
+        [
+            "ms300",
+            "vfd-e",
+            "yl620",
+            "a1000",
+            "saj8000m",
+            "sunfar-e300",
+            "v20",
+            "wj200",
+            "h100",
+            "md500",
+            "fr-d700",
+            "vf-s15",
+        ],
         0x03,
     ),
     "j1000": 0x21,

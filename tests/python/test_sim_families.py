@@ -47,6 +47,7 @@ FAMILIES = {
     31: "acs580",
     32: "fc202",
     33: "j1000",
+    34: "vf-s15",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -251,6 +252,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "fc51",
             "fc202",
             "h100",
+            "vf-s15",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:

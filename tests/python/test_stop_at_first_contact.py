@@ -12,7 +12,7 @@ import drivebus
 from drivebus import Bus, Profile, Simulator
 
 QUESTIONS = {
-    **dict.fromkeys(("vfd500", "wj200", "h100"), (0, 4)),
+    **dict.fromkeys(("vfd500", "wj200", "h100", "vf-s15"), (0, 4)),
     **dict.fromkeys(("gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a"), (4, 75)),
     **dict.fromkeys(("gd600", "gd3000"), (4, 75)),
     **dict.fromkeys(("eds300", "sunfar-e300", "fc202"), (5, 90)),

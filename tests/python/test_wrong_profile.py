@@ -58,12 +58,13 @@ SILENT_ON_CODES = [
     "md500",
     "fr-d700",
     "j1000",
+    "vf-s15",
 ]
 """The families whose units refuse 2103H."""
 
 SIGNED = [
     *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "v20"),
-    *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000"),
+    *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15"),
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -101,6 +102,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "a1000": ["a1000"],
     # And this one 0020H and 0023H; a real A1000 may answer them, too.
     "j1000": ["j1000"],
+    # And this one FD00H and FD01H.
+    "vf-s15": ["vf-s15"],
     "eds300": ["eds300"],
     "sunfar-e300": ["sunfar-e300"],
     # And this one ETA, rFr and CMD: 0C81H, 0C82H and 2135H.

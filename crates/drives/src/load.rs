@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 33] = [
+static BUILTINS: [Builtin; 34] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -175,6 +175,7 @@ static BUILTINS: [Builtin; 33] = [
     builtin!("acs580": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("fc51": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("fc202": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("vf-s15": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("wj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("h100": "registers.csv" "parameters.csv" "faults.csv"),
 ];

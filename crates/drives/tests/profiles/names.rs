@@ -98,6 +98,8 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("vfd-el", "vfd-e"),
         ("Mitsubishi FR-D700", "fr-d700"),
         ("Yaskawa J1000", "j1000"),
+        ("Toshiba VF-S15", "vf-s15"),
+        ("vf-s11", "vf-s15"),
         ("JZA", "j1000"),
         ("FR-D740", "fr-d700"),
         ("fr e740", "fr-d700"),

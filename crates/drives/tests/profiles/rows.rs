@@ -228,6 +228,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("saj8000m", 14),
         ("sunfar-e300", 6),
         ("v20", 19),
+        ("vf-s15", 9),
         ("vfd-e", 23),
         ("vfd500", 47),
         ("yl620", 33),

@@ -35,6 +35,7 @@ mod saj8000m;
 mod sunfar;
 mod unlisted;
 mod v20;
+mod vf_s15;
 mod vfd500;
 mod vfd_e;
 mod wj200;
@@ -149,7 +150,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 33] = [
+const FAMILIES: [fn() -> Family; 34] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -182,6 +183,7 @@ const FAMILIES: [fn() -> Family; 33] = [
     fc202::fc202,
     fr_d700::fr_d700,
     wj200::wj200,
+    vf_s15::vf_s15,
     h100::h100,
 ];
 
