@@ -111,6 +111,30 @@ MAKERS = [
         sure=True,
         forward_alone="10 00 01 00 01 02 00 01",
     ),
+    # The first frame of its manual's example, but for the frequency.
+    Maker(
+        "j1000",
+        variants={"speed_unit": "Hz"},
+        forward=("10 00 01 00 02 04 00 01 07 d0",),
+        reverse="10 00 01 00 01 02 00 02",
+        stop="10 00 01 00 01 02 00 00",
+        reset="10 00 01 00 01 02 00 08",
+        fault=8,
+        unverified=True,
+        forward_alone="10 00 01 00 01 02 00 01",
+    ),
+    # 1770H at FA01H is 60 Hz in its manual.
+    Maker(
+        "vf-s15",
+        forward=("06 fa 01 07 d0", "06 fa 00 c4 00"),
+        reverse="06 fa 00 c6 00",
+        stop="06 fa 00 c0 00",
+        coast="06 fa 00 c8 00",
+        reset="06 fa 00 e0 00",
+        fault=0x0E,
+        shown="",
+        unverified=True,
+    ),
     Maker(
         "saj8000m",
         hertz=None,
@@ -193,6 +217,8 @@ def test_a_whole_job_is_these_bytes(line: Simulator, drive: Drive, maker: Maker)
     turning = 50.0 if maker.hertz is None else maker.hertz
     drive.run(maker.hertz)
     drive.wait_for_speed(turning, timeout=30.0)
+    # A tenth of a hertz below it counts as there.
+    line.advance(0.1)
     assert machine.frequency == pytest.approx(turning)
     assert written(line) == [*maker.prepare, *maker.forward]
     status = drive.status()
@@ -310,7 +336,7 @@ class TestDelta:
         asked = [data[2:4].hex() for _, who, data in line.line.trace() if who == "master" and data[1] == 0x03]
         assert list(dict.fromkeys(asked)) == [
             *("2103", "1900", "2104", "2106", "200b", "3000"),
-            *("2108", "7000", "004b", "2180", "d000", "045c", "0c81", "006d", "0003", "c417", "1003"),
+            *("2108", "7000", "004b", "0020", "2180", "d000", "045c", "0c81", "006d", "0003", "c417", "fd00", "1003"),
         ]
 
     @pytest.mark.parametrize(("hertz", "word"), [(4.16, 0x01A0), (2.64, 0x0108), (2.66, 0x010A)])

@@ -22,6 +22,7 @@ RUN = ["gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a", "
 VARIANTS = {
     "vfd500": {"speed_unit": "Hz"},
     "a1000": {"speed_unit": "Hz"},
+    "j1000": {"speed_unit": "Hz"},
     "fc51": {"base_frequency": "50 Hz"},
     "fc202": {"base_frequency": "50 Hz"},
     "v20": {"base_frequency": "50 Hz"},
@@ -37,15 +38,33 @@ READ_ONLY = {
     **dict.fromkeys(
         [
             *("ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
-            *("acs580", "atv12", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700"),
+            *("acs580", "atv12", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15"),
         ],
         0x02,
     ),
+    "j1000": 0x22,
 }
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
-OUT_OF_RANGE = dict.fromkeys(
-    ["ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "v20", "wj200", "h100", "md500", "fr-d700"], 0x03
-)
+OUT_OF_RANGE = {
+    **dict.fromkeys(
+        [
+            "ms300",
+            "vfd-e",
+            "yl620",
+            "a1000",
+            "saj8000m",
+            "sunfar-e300",
+            "v20",
+            "wj200",
+            "h100",
+            "md500",
+            "fr-d700",
+            "vf-s15",
+        ],
+        0x03,
+    ),
+    "j1000": 0x21,
+}
 """And a value that is out of range, where it is not their 04H."""
 
 WITHOUT = {

@@ -48,6 +48,8 @@ FAMILIES = {
     32: "fc202",
     33: "atv12",
     34: "atv600",
+    35: "j1000",
+    36: "vf-s15",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 
@@ -254,6 +256,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "fc51",
             "fc202",
             "h100",
+            "vf-s15",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:

@@ -12,7 +12,7 @@ import drivebus
 from drivebus import Bus, Profile, Simulator
 
 QUESTIONS = {
-    **dict.fromkeys(("vfd500", "wj200", "h100"), (0, 4)),
+    **dict.fromkeys(("vfd500", "wj200", "h100", "vf-s15"), (0, 4)),
     **dict.fromkeys(("gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a"), (4, 75)),
     **dict.fromkeys(("gd600", "gd3000"), (4, 75)),
     **dict.fromkeys(("eds300", "sunfar-e300", "fc202"), (5, 90)),
@@ -26,6 +26,7 @@ QUESTIONS = {
     # An MD500 has its setpoint where these take their commands, and is asked for 7000H.
     **dict.fromkeys(("chf100a", "saj8000m"), (7, 120)),
     **dict.fromkeys(("atv312", "atv12", "atv600", "a1000"), (6, 105)),
+    "j1000": (7, 125),
     "v20": (8, 140),
     # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there.
     "acs355": (10, 172),

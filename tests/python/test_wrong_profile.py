@@ -59,12 +59,14 @@ SILENT_ON_CODES = [
     "yl620",
     "md500",
     "fr-d700",
+    "j1000",
+    "vf-s15",
 ]
 """The families whose units refuse 2103H."""
 
 SIGNED = [
     *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "v20"),
-    *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700"),
+    *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15"),
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -100,6 +102,10 @@ TAKEN_FOR: dict[str, list[str]] = {
     "fr-d700": ["fr-d700"],
     # And this one 004BH and 0034H, this one 2180H, and this one D000H.
     "a1000": ["a1000"],
+    # And this one 0020H and 0023H; a real A1000 may answer them, too.
+    "j1000": ["j1000"],
+    # And this one FD00H and FD01H.
+    "vf-s15": ["vf-s15"],
     "eds300": ["eds300"],
     "sunfar-e300": ["sunfar-e300"],
     # And these rFr and CMD: 0C82H and 2135H; this one Otr, 0C85H, and that one HMIS, 0CA8H.

@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 34] = [
+static BUILTINS: [Builtin; 36] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -164,6 +164,7 @@ static BUILTINS: [Builtin; 34] = [
     builtin!("yl620": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("md500": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("a1000": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("j1000": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("saj8000m": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("eds300": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("sunfar-e300": "registers.csv" "parameters.csv" "faults.csv"),
@@ -176,6 +177,7 @@ static BUILTINS: [Builtin; 34] = [
     builtin!("acs580": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("fc51": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("fc202": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("vf-s15": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("wj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("h100": "registers.csv" "parameters.csv" "faults.csv"),
 ];

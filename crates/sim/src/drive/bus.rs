@@ -275,11 +275,10 @@ impl Drive {
             return;
         }
         let before = self.control_word(address);
-        let stores = match self.family().memory {
-            Memory::RamUntil(at, bits) if at == address => word & bits,
-            _ => 0,
+        let (stores, word) = match self.family().memory {
+            Memory::RamUntil(at, bits) if at == address => (bits == 0 || word & bits != 0, word & !bits),
+            _ => (false, word),
         };
-        let word = word & !stores;
         match self.target(address) {
             Some(Target::Control) => {
                 if let Some(control) = self.map.control(address).and_then(|place| self.control.get_mut(place)) {
@@ -290,7 +289,7 @@ impl Drive {
             Some(Target::Ram) => self.store.write_ram(plain, word),
             None => {}
         }
-        if stores != 0 {
+        if stores {
             self.store.keep_all();
         }
         if self.is_password(address) {

@@ -27,6 +27,7 @@ mod gd350;
 mod gd600;
 mod h100;
 mod handshake;
+mod j1000;
 mod md500;
 mod ms300;
 pub(crate) mod own;
@@ -36,6 +37,7 @@ mod saj8000m;
 mod sunfar;
 mod unlisted;
 mod v20;
+mod vf_s15;
 mod vfd500;
 mod vfd_e;
 mod wj200;
@@ -122,6 +124,7 @@ pub(crate) enum Memory {
     /// Every write is kept in EEPROM; there is no address with such a bit.
     EepromOnly,
     /// Every write goes to RAM, until the word at this address has one of these bits: that stores all, and the bits go back to 0.
+    /// Where there are none, any word that is written there stores all.
     RamUntil(u32, u16),
 }
 
@@ -149,7 +152,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 34] = [
+const FAMILIES: [fn() -> Family; 36] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -170,6 +173,7 @@ const FAMILIES: [fn() -> Family; 34] = [
     yl620::yl620,
     md500::md500,
     a1000::a1000,
+    j1000::j1000,
     saj8000m::saj8000m,
     eds300::eds300,
     sunfar::e300,
@@ -183,6 +187,7 @@ const FAMILIES: [fn() -> Family; 34] = [
     fc202::fc202,
     fr_d700::fr_d700,
     wj200::wj200,
+    vf_s15::vf_s15,
     h100::h100,
 ];
 

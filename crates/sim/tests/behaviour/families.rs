@@ -201,6 +201,8 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "yl620",
         "md500",
         "fr-d700",
+        "j1000",
+        "vf-s15",
     ] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }

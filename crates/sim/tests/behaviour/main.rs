@@ -21,5 +21,7 @@ mod own_profiles;
 mod ports;
 mod refusals;
 mod running;
+mod toshiba;
 mod vfd500;
 mod wire;
+mod yaskawa;
