@@ -57,6 +57,8 @@ def is_kept(real: Profile, address: int) -> bool:
     if name is None or real.describe(name).kind != "parameter" or real.describe(name).access == "ro":
         return False
     memory = real.memory()
+    if memory is not None and memory["bit"] is None:
+        return False  # it stays in RAM until all is stored
     return memory is None or bool(address >> memory["bit"] & 1) == (memory["means"] == "eeprom")
 
 
