@@ -19,7 +19,7 @@ from .recorded_operations import FOLDER, conversations, replay
 from .recorded_scenes import MISHAPS
 
 AT_LEAST = 2000
-MOST_BYTES = 4_500_000
+MOST_BYTES = 5_000_000
 
 
 @pytest.mark.parametrize("family", profiles())
