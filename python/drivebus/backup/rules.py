@@ -8,6 +8,7 @@ from drivebus import checks
 from drivebus.advice import Text, argument
 from drivebus.backup.unread import Unread
 from drivebus.errors import BadArgument, NotAllowed
+from drivebus.operations.kept import store_register
 from drivebus.profile import Profile
 from drivebus.values import group_of
 
@@ -21,9 +22,7 @@ class Rules:
         self.profile = profile
         self._serial = frozenset(profile.serial_parameters())
         self._motor = frozenset(profile.motor_parameters())
-        memory = profile.memory()
-        stores = [] if memory is None or memory.store_register is None else [memory.store_register]
-        self._acts = frozenset((*profile.acts(), *stores))
+        self._acts = frozenset((*profile.acts(), *filter(None, [store_register(profile)])))
         self._faults = frozenset((*profile.fault_history, *profile.fault_values))
 
     def codes(self) -> list[str]:

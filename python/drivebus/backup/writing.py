@@ -80,8 +80,7 @@ async def _put(unit: DriveView, code: str, address: int, word: int, *, store: bo
 
 def stores_all(unit: DriveView) -> bool:
     """Whether all stays in RAM until a word stores it."""
-    memory = unit.profile.memory()
-    return memory is not None and memory.means == "store"
+    return kept.store_register(unit.profile) is not None
 
 
 async def store_all(unit: DriveView, codes: Iterable[str]) -> None:

@@ -141,7 +141,7 @@ class ManualTable:
         return [row for row in self.rows if row.code]
 
     def give_up(self, row: TableRow, reason: str) -> None:
-        """What *row* says cannot be: its factory value goes, then its range, into its note; at last the row itself."""
+        """What *row* says cannot be: factory value, choices or range goes into its note; at last the row goes."""
         if row.default:
             row.notes.append(f"the table has the factory value {row.default}")
             row.default = ""

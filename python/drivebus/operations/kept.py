@@ -15,9 +15,10 @@ from drivebus.errors import StoreWarning, level_of_the_program
 from drivebus.operations.drive_view import DriveView
 
 if TYPE_CHECKING:
+    from drivebus.profile import Profile
     from drivebus.values import Description
 
-__all__ = ["is_in_ram", "key", "put_in_ram", "stored", "warn_of_wear"]
+__all__ = ["is_in_ram", "key", "put_in_ram", "store_register", "stored", "warn_of_wear"]
 
 
 def is_in_ram(unit: DriveView, name: str) -> bool:
@@ -50,6 +51,12 @@ def warn_of_wear(unit: DriveView, name: str, times: int) -> None:
         ),
         stacklevel=level_of_the_program(),
     )
+
+
+def store_register(profile: Profile) -> str | None:
+    """The register whose word stores all that is in RAM; None where what is written is kept, or not, by its address."""
+    memory = profile.memory()
+    return None if memory is None else memory.store_register
 
 
 def key(known: Description) -> str:

@@ -15,6 +15,7 @@ from drivebus.line.blocking import at_once
 from drivebus.line.write_guard import commanded_at
 from drivebus.operations import last_will
 from drivebus.operations.drive_view import DriveView
+from drivebus.operations.kept import store_register
 from drivebus.profile.evidence import Evidence
 
 __all__ = ["READS", "WRITES", "Halts", "Writable", "halts_of", "is_what_it_should_be", "moves", "of_drive", "of_unit"]
@@ -159,14 +160,13 @@ def _register(evidence: Evidence, name: object) -> Iterator[Writable]:
         means = "moves"
     shown = profile.read_back(name)
     shown_at = shown if shown is not None and known.kind == "parameter" and shown <= 0xFFFF else None
-    memory = profile.memory()
-    stores = None if memory is None else memory.store_register
+    stores = store_register(profile)
     if stores is not None and stores in {known.name, known.code}:
         yield _at(place, None, "wears", called)
     elif known.kind != "parameter" or stores is not None:
         # What stays in RAM until all is stored wears nothing by itself.
         yield _at(place, None, means, called, shown_at=shown_at)
-    elif memory is None:
+    elif profile.memory() is None:
         yield _at(place, None, means if means == "moves" else "wears", called, shown_at=shown_at)
     else:
         in_ram, kept = profile.address(name, store=False), profile.address(name, store=True)

@@ -53,12 +53,13 @@ def run(session: Session, hz: float | None, reverse: bool, wait: float | None, f
     way = "in reverse" if reverse else "forward"
     speed = "at the setpoint it has" if hz is None else f"at {hz:g} Hz"
     with session.drive() as drive:
-        wanted = None if (told := drive.profile.role("setpoint") is not None) else hz
-        if wait is not None and wanted is None and not told:
+        told = drive.profile.role("setpoint") is not None
+        if wait is not None and hz is None and not told:
             raise drivebus.BadArgument(
                 f"{drive.profile.title} does not tell its setpoint, so there is no speed to wait for: give the speed, "
                 f"or leave --wait out. Nothing was sent to unit {drive.unit}"
             )
+        wanted = None if told else hz
         if wait is not None:
             drive.check_speed(wanted)
         session.ask(f"This starts the motor {way} {speed}", yes)
