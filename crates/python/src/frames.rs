@@ -1,6 +1,7 @@
 //! Frames without a line: encode, judge, take apart, and the CRC.
 
 use drivebus_drive::huanyang;
+use drivebus_rtu::huanyang::{has_form, is_sure};
 use drivebus_rtu::{
     Adu, Answer, AnswerLength, Destination, Frame, Request, Table, Touched, UnitAddress, crc16 as crc,
     frame_len as len_of, function,
@@ -243,7 +244,7 @@ pub(crate) fn all_frames_in(data: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, usi
 #[pyo3(signature = (data, /))]
 pub(crate) fn huanyang_form(data: &Bound<'_, PyAny>) -> PyResult<(bool, bool)> {
     let bytes = bytes_of(data)?;
-    Ok((huanyang::has_form(bytes.as_bytes()), huanyang::is_sure(bytes.as_bytes())))
+    Ok((has_form(bytes.as_bytes()), is_sure(bytes.as_bytes())))
 }
 
 /// Whether `data`, which came where `unit` was asked, may hold an answer of it.

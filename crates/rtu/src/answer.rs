@@ -203,6 +203,7 @@ impl<'a> Answer<'a> {
             | Request::ReportServerId
             | Request::ReadWrite { .. }
             | Request::ReadIdentification { .. }
+            | Request::Huanyang(_)
             | Request::Custom { .. } => None,
         }
     }

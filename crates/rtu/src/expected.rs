@@ -4,6 +4,7 @@ mod shape;
 
 use crate::answer::{Answer, AnswerError, Head, MOST};
 use crate::frame::Frame;
+use crate::huanyang::Huanyang;
 use crate::identification::{IdentificationLevel, IdentificationPage};
 use crate::pdu::function::{
     DIAGNOSTICS, ENCAPSULATED, EXCEPTION_BIT, IDENTIFICATION, MASK_WRITE, READ_COILS, READ_INPUT, READ_WRITE,
@@ -30,6 +31,7 @@ enum Kind {
     MaskWrite { address: u16, and: u16, or: u16 },
     ReadWrite { count: u16 },
     Identification { level: IdentificationLevel, object: u8 },
+    Huanyang(Huanyang),
     Custom { function: u8, answer: AnswerLength },
 }
 
@@ -51,6 +53,7 @@ impl Expected {
             Request::MaskWrite { address, and, or } => Kind::MaskWrite { address, and, or },
             Request::ReadWrite { count, .. } => Kind::ReadWrite { count },
             Request::ReadIdentification { level, object } => Kind::Identification { level, object },
+            Request::Huanyang(asked) => Kind::Huanyang(asked),
             Request::Custom { answer, .. } => Kind::Custom { function: request.function(), answer },
         })
     }
@@ -68,6 +71,7 @@ impl Expected {
             Kind::MaskWrite { .. } => MASK_WRITE,
             Kind::ReadWrite { .. } => READ_WRITE,
             Kind::Identification { .. } => ENCAPSULATED,
+            Kind::Huanyang(asked) => asked.function(),
             Kind::Custom { function, .. } => function,
         }
     }
@@ -100,7 +104,10 @@ impl Expected {
             Kind::MaskWrite { .. } => Some(7),
             Kind::ReadWrite { count } => Some(2 + 2 * count as usize),
             Kind::Custom { answer: AnswerLength::Bytes(pdu), .. } => Some(pdu as usize),
-            Kind::ServerId | Kind::Identification { .. } | Kind::Custom { answer: AnswerLength::BySilence, .. } => None,
+            Kind::ServerId
+            | Kind::Identification { .. }
+            | Kind::Huanyang(_)
+            | Kind::Custom { answer: AnswerLength::BySilence, .. } => None,
         }
     }
 
@@ -118,13 +125,18 @@ impl Expected {
             Kind::ReadWrite { count } => Some(2 * count as u8),
             Kind::Echo { .. } => Some(0),
             Kind::Identification { .. } => Some(IDENTIFICATION),
-            Kind::ServerId | Kind::Custom { .. } => None,
+            Kind::ServerId | Kind::Huanyang(_) | Kind::Custom { .. } => None,
         }
     }
 
     /// Whether nobody knows beforehand how long the answer is, and its own bytes tell.
     pub(crate) const fn tells_its_length(self) -> bool {
         matches!(self.0, Kind::ServerId | Kind::Identification { .. })
+    }
+
+    /// Whether the byte behind the function says how many follow, in an answer and in a refusal.
+    pub(crate) const fn is_counted(self) -> bool {
+        matches!(self.0, Kind::Huanyang(_))
     }
 
     /// Whether the specification says more of the answer to `asked`, the PDU of the request: checks `pdu` against that.
@@ -168,12 +180,18 @@ impl Expected {
 
     /// Whether words or bits are read.
     pub(crate) const fn is_read(self) -> bool {
-        matches!(self.0, Kind::Read { .. })
+        match self.0 {
+            Kind::Read { .. } => true,
+            Kind::Huanyang(asked) => !asked.is_write(),
+            _ => false,
+        }
     }
 
     /// Whether an answer to this could be taken for one to `other`. Refusals aside: those of one function look alike.
     pub(crate) fn could_pass_for(self, other: Self) -> bool {
         match (self.0, other.0) {
+            (Kind::Huanyang(ours), Kind::Huanyang(theirs)) => ours.could_pass_for(theirs),
+            (Kind::Huanyang(_), _) | (_, Kind::Huanyang(_)) => self.function() == other.function(),
             (Kind::Custom { .. }, _) | (_, Kind::Custom { .. }) => {
                 let (ours, theirs) = (self.length(), other.length());
                 let fits = ours == theirs
@@ -212,8 +230,11 @@ impl Expected {
 
     /// Whether the right answer may be the request once more, so that an adapter's own echo cannot be told from it.
     ///
-    /// Always so for 05H, 06H, 08H and 16H; of a custom function nobody knows.
+    /// Always so for 05H, 06H, 08H and 16H, and in Huanyang's protocol of all but a status; of a custom function nobody knows.
     pub const fn may_repeat_request(&self) -> bool {
+        if let Kind::Huanyang(asked) = self.0 {
+            return asked.may_repeat_request();
+        }
         matches!(
             self.0,
             Kind::WriteCoil { .. }
@@ -243,6 +264,7 @@ impl Expected {
     /// [`AnswerError`]: it is neither.
     pub(crate) fn parse(self, pdu: &[u8]) -> Result<Answer<'_>, AnswerError> {
         match (self.0, pdu) {
+            (Kind::Huanyang(asked), _) => asked.judge(pdu),
             (Kind::Custom { .. }, [function, ..]) if function & EXCEPTION_BIT == 0 => Ok(Answer::Custom { pdu }),
             (Kind::Read { count, table }, _) if table.is_bits() => Ok(Answer::parse(pdu)?.shortened(count)),
             _ => Answer::parse(pdu),
@@ -261,6 +283,9 @@ impl Expected {
         };
         if came & !EXCEPTION_BIT != self.function() {
             return Err(AnswerError::Function { asked: self.function(), came });
+        }
+        if let Kind::Huanyang(asked) = self.0 {
+            return asked.judge(pdu);
         }
         if let (Kind::Custom { answer, .. }, false) = (self.0, came & EXCEPTION_BIT != 0) {
             return match answer {

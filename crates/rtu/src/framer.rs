@@ -71,6 +71,8 @@ struct Awaited {
     len: Option<usize>,
     /// Whether its own bytes tell instead.
     tells: bool,
+    /// Whether they do so right behind the function, of whatever answer.
+    counted: bool,
 }
 
 /// One step of the framer, without borrowing from it.
@@ -109,6 +111,7 @@ impl Framer {
             function: expected.function(),
             len: expected.adu_len(),
             tells: expected.tells_its_length(),
+            counted: expected.is_counted(),
         });
         self.patience = None;
         self.is_late = false;

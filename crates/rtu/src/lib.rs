@@ -15,6 +15,7 @@ mod expected;
 mod frame;
 mod framer;
 mod functions;
+pub mod huanyang;
 mod identification;
 mod inside;
 mod master;

@@ -6,6 +6,7 @@ mod seldom;
 
 use core::fmt;
 
+use crate::huanyang::Huanyang;
 use crate::identification::IdentificationLevel;
 use crate::pdu::function::{
     DIAGNOSTICS, ENCAPSULATED, EXCEPTION_BIT, MASK_WRITE, READ_COILS, READ_INPUT, READ_WRITE, REPORT_SERVER_ID,
@@ -101,6 +102,8 @@ pub enum Request<'a> {
         /// From which object on, or which one.
         object: u8,
     },
+    /// What a unit is asked that speaks Huanyang's own protocol, and no Modbus.
+    Huanyang(Huanyang),
     /// Any other PDU.
     #[non_exhaustive]
     Custom {
@@ -289,6 +292,7 @@ impl<'a> Request<'a> {
             Self::MaskWrite { .. } => MASK_WRITE,
             Self::ReadWrite { .. } => READ_WRITE,
             Self::ReadIdentification { .. } => ENCAPSULATED,
+            Self::Huanyang(asked) => asked.function(),
             Self::Custom { pdu, .. } => pdu[0],
         }
     }
@@ -306,6 +310,7 @@ impl<'a> Request<'a> {
             | Self::WriteCoils { .. }
             | Self::MaskWrite { .. }
             | Self::ReadWrite { .. } => true,
+            Self::Huanyang(asked) => asked.is_write(),
             Self::Custom { pdu, .. } => !reads(pdu),
         }
     }
@@ -320,6 +325,7 @@ impl<'a> Request<'a> {
             Self::MaskWrite { .. } => 7,
             Self::ReadWrite { words, .. } => 10 + 2 * words.len(),
             Self::ReadIdentification { .. } => 4,
+            Self::Huanyang(asked) => asked.pdu_len(),
             Self::Custom { pdu, .. } => pdu.len(),
         };
         AROUND_PDU + pdu
@@ -346,6 +352,7 @@ impl<'a> Request<'a> {
                 target[..pdu.len()].copy_from_slice(pdu);
                 pdu.len()
             }
+            Self::Huanyang(asked) => asked.put(target),
             _ => self.put_seldom(target),
         }
     }

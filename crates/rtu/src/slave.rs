@@ -5,6 +5,7 @@
 
 use crate::frame::Frame;
 use crate::framer::{Framer, Step};
+use crate::huanyang::{Huanyang, Protocol};
 use crate::pdu::function::EXCEPTION_BIT;
 use crate::request::{Request, RequestError};
 use crate::{Destination, FrameError, Instant, SerialFormat, UnitAddress};
@@ -34,6 +35,7 @@ use crate::{Destination, FrameError, Instant, SerialFormat, UnitAddress};
 pub struct Slave {
     unit: UnitAddress,
     framer: Framer,
+    protocol: Protocol,
 }
 
 /// What a unit hears.
@@ -70,7 +72,13 @@ pub enum SlaveEvent<'a> {
 impl Slave {
     /// The ear of `unit` on a line of `format`.
     pub const fn new(unit: UnitAddress, format: &SerialFormat) -> Self {
-        Self { unit, framer: Framer::new(format.t35()) }
+        Self { unit, framer: Framer::new(format.t35()), protocol: Protocol::Modbus }
+    }
+
+    /// The same for a unit that speaks `protocol`. In Huanyang's own each frame ends with a silence.
+    #[must_use]
+    pub const fn speaking(self, protocol: Protocol) -> Self {
+        Self { protocol, ..self }
     }
 
     /// Who listens.
@@ -104,6 +112,13 @@ impl Slave {
             Ok(Destination::Unit(unit)) if unit == self.unit => false,
             _ => return Some(SlaveEvent::Foreign(frame)),
         };
+        if self.protocol == Protocol::Huanyang {
+            // What it does not know it is silent on, as on a frame of Modbus.
+            return Some(match Huanyang::parse(frame.pdu()) {
+                Some(asked) => SlaveEvent::Request { request: Request::Huanyang(asked), broadcast },
+                None => SlaveEvent::Foreign(frame),
+            });
+        }
         Some(match (Request::parse(frame.pdu()), frame.pdu()) {
             (Ok(request), _) => SlaveEvent::Request { request, broadcast },
             (Err(error), [function @ 1..EXCEPTION_BIT, ..]) => {

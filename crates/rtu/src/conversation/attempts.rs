@@ -53,7 +53,12 @@ impl Conversation<'_> {
     /// The first attempt.
     fn begin(&mut self) {
         let request = &self.question.request;
-        if !matches!(request, Request::Read { .. } | Request::ReportServerId | Request::ReadIdentification { .. }) {
+        let is_asked_again = match request {
+            Request::Read { .. } | Request::ReportServerId | Request::ReadIdentification { .. } => true,
+            Request::Huanyang(asked) => !asked.is_write(),
+            _ => false,
+        };
+        if !is_asked_again {
             self.write = Write::of(&self.question, self.retries);
             self.course.go_on_with(self.question.timeout, 0);
         }

@@ -61,7 +61,7 @@ impl Met {
                     None => self.is_blurred = true,
                 }
             }
-            Request::Custom { .. } => self.is_blurred = true,
+            Request::Custom { .. } | Request::Huanyang(_) => self.is_blurred = true,
             _ => {}
         }
     }

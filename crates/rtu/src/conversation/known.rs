@@ -8,6 +8,7 @@ use super::fresh_words::FreshWords;
 use super::longer_reads::Longer;
 use super::probes::{Probe, Tried};
 use super::units::Units;
+use crate::huanyang::Huanyang;
 use crate::{Attribution, Destination, Instant, Master, Patience, Request, SerialFormat, Table, Tally, UnitAddress};
 
 /// One request on its way.
@@ -375,6 +376,10 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
     /// The read that shows whether the adapter echoes; what is answered does not matter. Before a read whose answer is to be
     /// told `apart`, one word more than that asks for.
     pub(super) fn look(&self, now: Instant, ask: &Ask<'_>, apart: bool) -> Option<Request<'static>> {
+        if let Request::Huanyang(_) = ask.request {
+            // Nothing of Modbus goes to such a unit, and of this its answer is longer.
+            return Some(Request::Huanyang(Huanyang::ReadStatus { number: 1 }));
+        }
         let (address, count) = match ask.request {
             Request::Read { table: Table::Holding, address, count, .. }
                 if apart && count < super::probes::MAX_WORDS =>

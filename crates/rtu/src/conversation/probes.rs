@@ -131,6 +131,9 @@ impl Probing {
         tried: &Tried,
         in_time: bool,
     ) -> Option<Probe> {
+        if let Request::Huanyang(_) = request {
+            return None; // it knows no echo, and nothing else of Modbus
+        }
         let known = self;
         let again = match known.echo {
             Some(Echo::Returned) => in_time && tried.echoes < ECHOES,

@@ -24,6 +24,9 @@ const TOLD: usize = 3;
 /// would be one more place at which a damaged answer could seem to end.
 const BEHIND: usize = 8;
 
+/// The most bytes that follow the count in Huanyang's protocol.
+const MOST_COUNTED: u8 = 3;
+
 /// What may stand at one place of the stream.
 pub(super) enum Look {
     Frame(usize),
@@ -72,7 +75,7 @@ impl Framer {
                 _ => Look::Nothing(error.or(Frame::parse(here).err()).filter(|_| here.len() >= TOLD)),
             };
         }
-        let by_silence = if expected { self.answer_len().is_none() } else { fresh };
+        let by_silence = if expected { self.answer_len().is_none() && !self.is_counted() } else { fresh };
         if closed && by_silence && (MIN_ADU..=MAX_ADU).contains(&here.len()) {
             match Frame::parse(here) {
                 Ok(_) => return Look::Frame(here.len()),
@@ -117,7 +120,9 @@ impl Framer {
         // The longest frame is whole only when nothing follows it.
         let more = Some(here.len() + 1).filter(|_| here.len() <= MAX_ADU);
         let asked = match *here {
-            [_, function, ..] if expected && function & EXCEPTION_BIT == 0 => self.answer_len().or(more),
+            [_, function, ..] if expected && function & EXCEPTION_BIT == 0 && !self.is_counted() => {
+                self.answer_len().or(more)
+            }
             // Only silence can tell where an unknown function ends, and a master that did not ask for it does not
             // care.
             [(..=HIGHEST_UNIT), (1..EXCEPTION_BIT), ..] if fresh && self.expect.is_none() && first.is_none() => more,
@@ -130,6 +135,9 @@ impl Framer {
 
     /// Length that the answer looked for has by its own account.
     fn answer_lengths(&self, here: &[u8]) -> [Option<usize>; 2] {
+        if self.is_counted() {
+            return self.counted_lengths(here);
+        }
         let len = match *here {
             [_, READ_COILS..=READ_INPUT, bytes, ..] => EXCEPTION_ADU + usize::from(bytes),
             [_] | [_, READ_COILS..=READ_INPUT] => here.len() + 1,
@@ -138,6 +146,26 @@ impl Framer {
             _ => return [self.told_length(here), None],
         };
         [Some(len).filter(|&len| len <= MAX_ADU), None]
+    }
+
+    /// Lengths that an answer has which says so right behind the function, as in Huanyang's protocol. A refusal may be as short as
+    /// one of Modbus.
+    #[cold]
+    fn counted_lengths(&self, here: &[u8]) -> [Option<usize>; 2] {
+        match *here {
+            [_] | [_, _] => [Some(here.len() + 1), None],
+            [_, function, count, ..] => {
+                let told = EXCEPTION_ADU + usize::from(count);
+                let short = Some(EXCEPTION_ADU).filter(|_| function & EXCEPTION_BIT != 0);
+                [Some(told).filter(|_| count <= MOST_COUNTED), short]
+            }
+            [] => [None, None],
+        }
+    }
+
+    /// Whether the answer looked for says right behind its function how long it is.
+    fn is_counted(&self) -> bool {
+        self.expect.is_some_and(|awaited| awaited.counted)
     }
 
     /// Length that an answer has by its own account of which nobody knows it beforehand.
@@ -173,7 +201,7 @@ impl Framer {
     /// Whether `here`, which begins as the answer looked for, is one that only silence ends.
     fn is_open_ended(&self, here: &[u8]) -> bool {
         let is_refusal = matches!(*here, [_, function, ..] if function & EXCEPTION_BIT != 0);
-        self.answer_len().is_none() && !is_refusal
+        self.answer_len().is_none() && !is_refusal && !self.is_counted()
     }
 
     /// Whether an answer that only silence ends has begun, and nothing stands before it.
@@ -197,6 +225,12 @@ impl Framer {
 
     /// Whether `here`, which begins as the answer looked for, only lacks its end.
     fn is_beginning_of_answer(&self, here: &[u8]) -> bool {
+        if self.is_counted() {
+            return match *here {
+                [_, _, count, ..] => count <= MOST_COUNTED && here.len() < EXCEPTION_ADU + usize::from(count),
+                _ => true,
+            };
+        }
         match *here {
             [_, function, ..] if function & EXCEPTION_BIT != 0 => here.len() < EXCEPTION_ADU,
             // Another number of words than asked for: no use waiting for the rest of it.
@@ -230,6 +264,8 @@ impl Framer {
         let own = own.starts_with(here).then_some(own.len());
         let answer = self.is_beginning_of_answer(here).then(|| match *here {
             // It may be a refusal.
+            [_] | [_, _] if self.is_counted() => EXCEPTION_ADU + 1,
+            [_, _, count, ..] if self.is_counted() => EXCEPTION_ADU + usize::from(count),
             [_] => EXCEPTION_ADU,
             [_, function, ..] if function & EXCEPTION_BIT != 0 => EXCEPTION_ADU,
             _ => self.answer_len().unwrap_or_default(),
