@@ -1,6 +1,7 @@
 //! Answers of a unit that is asked what it is, and what the refusals among them tell.
 
 use drivebus_drives::{Means, Place, Profile};
+use drivebus_rtu::huanyang::Protocol;
 use drivebus_rtu::{ExceptionCode, Meaning, Meanings};
 
 /// What profiles that list their exceptions call the one that says that there is no such address.
@@ -59,6 +60,14 @@ impl Answer {
     /// reach it.
     pub fn passes(self) -> bool {
         self.exception().is_some_and(|code| code == LOCKED || code.meaning() == Meaning::AskAgain)
+    }
+}
+
+/// Which protocol units of `profile` speak.
+pub fn protocol(profile: &Profile) -> Protocol {
+    match profile.requests().protocol {
+        drivebus_drives::Protocol::Huanyang => Protocol::Huanyang,
+        _ => Protocol::Modbus,
     }
 }
 

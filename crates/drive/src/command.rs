@@ -176,7 +176,7 @@ impl Unit {
         before: &Look,
     ) -> Result<(), Why<E>> {
         let (command, wanted) = (start.command(), start.wanted());
-        let (was_running, was_wanted) = (before.state.is_running(), before.state == wanted);
+        let (was_running, was_wanted) = (before.state.is_running(), before.state.shows(wanted));
         let shown = if was_running && !was_wanted {
             Shown::TurnsRound { wanted, from: self.output(line).await.map_err(Why::Failed)? }
         } else {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
 use drivebus_drives::{Place, Profile};
+use drivebus_rtu::huanyang::Protocol;
 
 use crate::codes::Codes;
 use crate::family::Family;
@@ -50,16 +51,23 @@ impl Families {
         })
     }
 
-    /// All that a unit may be of that was named as `own`: that one first, then those of other names. Of a name that it
-    /// shares with one of these, it is the one that is meant.
+    /// All that a unit may be of that was named as `own`: that one first, then those of other names that speak its protocol.
+    /// Of a name that it shares with one of these, it is the one that is meant.
+    ///
+    /// What is said in one protocol does nothing to a unit of another, which hears no request in it.
     pub fn with(&self, own: &Arc<Family>) -> Vec<Arc<Family>> {
-        let others = self.known.iter().filter(|each| each.name() != own.name());
+        let others = self.speaking(own.protocol()).filter(|each| each.name() != own.name());
         std::iter::once(own).chain(others).cloned().collect()
     }
 
     /// The one of this name.
     pub fn named(&self, name: &str) -> Option<&Arc<Family>> {
         self.known.iter().find(|family| family.name() == name)
+    }
+
+    /// Those whose units speak `protocol`.
+    pub(crate) fn speaking(&self, protocol: Protocol) -> impl Iterator<Item = &Arc<Family>> {
+        self.known.iter().filter(move |each| each.protocol() == protocol)
     }
 
     /// Each of them.

@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use drivebus_drives::{Access, Command, Entry, Identification, Place, Profile, Signature, State, Table};
+use drivebus_rtu::huanyang::Protocol;
 use drivebus_rtu::{ExceptionCode, Meaning, Meanings};
 
-use crate::answer::{Answer, is_no_such_address, meanings};
+use crate::answer::{Answer, is_no_such_address, meanings, protocol};
 use crate::codes::{self, Codes};
 
 /// The commands that end a motion, in the order of who else may stand in for one that a family lacks.
@@ -22,6 +23,7 @@ pub struct Family {
     /// Whether one of the families that its units report as is shipped.
     is_shipped: bool,
     meanings: Meanings,
+    protocol: Protocol,
     /// The exceptions that its documents list; empty where they list none.
     exceptions: BTreeSet<u8>,
     signature: Option<Signature>,
@@ -69,6 +71,7 @@ impl Family {
         Self {
             is_shipped,
             meanings: meanings(&profile),
+            protocol: protocol(&profile),
             exceptions: profile.exceptions().map(|row| row.code).collect(),
             code_place,
             is_listed,
@@ -93,6 +96,11 @@ impl Family {
     /// The name of its profile: `gd350`.
     pub fn name(&self) -> &str {
         self.profile.name()
+    }
+
+    /// Which protocol its units speak.
+    pub fn protocol(&self) -> Protocol {
+        self.protocol
     }
 
     /// Where its units keep their identification code; `None` if they have none, or nobody knows where.

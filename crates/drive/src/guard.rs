@@ -96,7 +96,8 @@ impl Families {
         let Some(family) = unit.first() else { return Ok(()) };
         let places = || std::iter::once(place).chain(unit.iter().map(|each| each.plain(place)));
         let is_known = || places().any(|place| unit.iter().any(|each| each.has(place)));
-        let others = places().map(|place| self.commanded_at(place)).find(|others| !others.is_empty());
+        let speaks = |others: &&[Arc<Family>]| others.iter().any(|each| each.protocol() == family.protocol());
+        let others = places().map(|place| self.commanded_at(place)).find(speaks);
         match others {
             Some(others) if !is_known() => Err(Forbidden::Foreign { family, place, others }),
             _ => Ok(()),

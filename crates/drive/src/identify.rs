@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use drivebus_drives::{Entry, Evidence, Identification as Row, Place};
+use drivebus_rtu::huanyang::Protocol;
 use drivebus_rtu::UnitAddress;
 
 use crate::answer::{Answer, Said};
@@ -233,7 +234,7 @@ async fn by_answers<E: LineError>(
     let mut asked: Asked = told.iter().map(|answer| (answer.place, answer.word().is_some())).collect();
     // Each question has its own place.
     let read = Read::word(unit, Place::from(0));
-    let shown = shown_by(line, families, read, &mut asked).await.map_err(NotTold::Failed)?;
+    let shown = shown_by(line, families, Protocol::Modbus, read, &mut asked).await.map_err(NotTold::Failed)?;
     if shown.is_empty() {
         let (candidates, titles) = (Vec::new(), Vec::new());
         return Ok(Identification {

@@ -52,7 +52,7 @@
 //! | `signatures` | whose signature a unit shows |
 //! | `identify` | what a unit of which nothing is known is |
 //! | `same_unit` | whether a unit is what it was named as, and still the one it was |
-//! | `huanyang` | frames of another protocol on the same wires, and what may be an answer |
+//! | `huanyang` | frames of another protocol on the same wires, where others are, too |
 //! | `aim` | as what a unit is halted, and whether a word may be sent to it |
 //! | `record` | what was sent to a unit, and what it said of itself |
 //! | `halt` | a halt: sent until the unit takes it, and proved; and those of several units, side by side |
@@ -121,7 +121,7 @@ mod wanted;
 mod writing;
 
 pub use aim::{ANSWER_WITHIN, Aim, NotTaken, Target, check_harmless, goes_out_at_once};
-pub use answer::{Answer, Said, meanings};
+pub use answer::{Answer, Said, meanings, protocol};
 pub use apart::{Apart, Verdict};
 pub use asked::{NotTold, answer_at, answer_once};
 pub use bits::{FieldInput, NotSetBits};

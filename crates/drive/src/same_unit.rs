@@ -237,7 +237,7 @@ impl SameUnit {
         let mut asked: Asked = told.map(|answer| (answer.place, answer.word().is_some())).collect();
         // Each question has its own place.
         let read = Read::word(self.unit, Place::from(0)).urgent(is_urgent);
-        let shown = shown_by(line, families, read, &mut asked).await?;
+        let shown = shown_by(line, families, self.family.protocol(), read, &mut asked).await?;
         Ok(Against { found: self.family.other_signature(shown), is_whole: !asked.is_wanting() })
     }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use drivebus_drives::{Place, Signature};
+use drivebus_rtu::huanyang::Protocol;
 
 use crate::asked::{NotTold, answer_at};
 use crate::families::Families;
@@ -36,7 +37,7 @@ impl FromIterator<(Place, bool)> for Asked {
     }
 }
 
-/// Those of `families` whose signature a unit shows, which is asked for more of it as in `read`.
+/// Those of `families` that speak `protocol` and whose signature a unit shows, which is asked for more of it as in `read`.
 ///
 /// What was asked before stands in `asked`, and what is asked goes there. Of a signature no more is asked once the unit
 /// does not show it, so that a unit of none of them is asked little.
@@ -47,11 +48,12 @@ impl FromIterator<(Place, bool)> for Asked {
 pub(crate) async fn shown_by<'f, E: LineError>(
     line: &Mailbox<E>,
     families: &'f Families,
+    protocol: Protocol,
     read: Read,
     asked: &mut Asked,
 ) -> Result<Vec<&'f Arc<Family>>, E> {
     let mut shown = Vec::new();
-    for family in families.iter() {
+    for family in families.speaking(protocol) {
         if let Some(signature) = family.profile().signature()
             && is_shown(line, signature, read, asked).await?
         {

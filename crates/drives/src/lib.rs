@@ -91,7 +91,7 @@ pub use parts::command::{Command, CommandCode, Control, ParseCommandError, Start
 pub use parts::fault::{Exception, Fault, Means};
 pub use parts::identification::{Identification, Signature};
 pub use parts::memory::{Memory, MemoryBit, StoreWord, ToldBy};
-pub use parts::rules::{Requests, UnitKind};
+pub use parts::rules::{Protocol, Requests, UnitKind};
 pub use parts::serial::SerialDefaults;
 pub use parts::setpoint::{Setpoint, SetpointRole};
 pub use parts::state::{State, StateRule, StateWord};

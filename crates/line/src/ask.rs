@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use drivebus_rtu::huanyang::Protocol;
 use drivebus_rtu::{Adu, Destination, Instant, Meanings, Request, UnitAddress};
 
 use crate::error::{CallError, Failure};
@@ -57,6 +58,10 @@ impl Ask<'_> {
     ) -> Box<CallError> {
         let (destination, request, raw) = (self.destination, self.frame(), raw.to_vec());
         let ended = ended.into();
-        Box::new(CallError { failure, destination, request, raw, sent, ended, set_again: None })
+        let protocol = match self.request {
+            Request::Huanyang(_) => Protocol::Huanyang,
+            _ => Protocol::Modbus,
+        };
+        Box::new(CallError { failure, destination, request, protocol, raw, sent, ended, set_again: None })
     }
 }

@@ -34,6 +34,7 @@ pub(crate) mod programs;
 mod shared;
 #[cfg_attr(not(all(any(unix, windows), feature = "share")), path = "bus/no_sharing.rs")]
 mod sharing;
+mod spoken;
 #[cfg_attr(not(all(any(unix, windows), feature = "share")), path = "bus/unshared.rs")]
 mod through;
 #[cfg_attr(not(all(unix, feature = "share")), path = "bus/no_wills.rs")]
@@ -43,6 +44,7 @@ pub(crate) mod workers;
 use std::sync::Arc;
 use std::time::Duration;
 
+use drivebus_rtu::huanyang::Protocol;
 use drivebus_rtu::{Answer, Destination, Instant, Meanings, Request, UnitAddress};
 
 use crate::ask::Done;
@@ -175,14 +177,26 @@ impl Bus {
             let ask = self.port().ask_as(UnitOptions::default(), destination, request, &options);
             return Err(ask.failed(Failure::Forked, None, None, &[]));
         }
-        let ask = self.port().ask(destination, request, &options);
-        if let Some(failure) = self.port().options.kept_from(request) {
-            return Err(ask.failed(failure, None, self.port().now_if_known(), &[]));
-        }
+        let said = match self.port().options.kept_from(request) {
+            Some(failure) => Err(failure),
+            None => self.port().spoken.say(destination, request),
+        };
+        let said = match said {
+            Ok(said) => said,
+            Err(failure) => {
+                let ask = self.port().ask(destination, request, &options);
+                return Err(ask.failed(failure, None, self.port().now_if_known(), &[]));
+            }
+        };
         let mut give_up = || self.is_shut() || give_up();
+        let options = spoken::options_for(&said, options);
+        let take = &mut |answer: Answer<'_>| spoken::tell(&said, request, answer, take);
         let result = match &self.shared.sharing {
-            Some(_) => self.shared.call_shared(destination, request, options, &mut give_up, take),
-            None => Call::new(self.port(), ask, options).run(&mut give_up, take),
+            Some(_) => self.shared.call_shared(destination, &said, options, &mut give_up, take),
+            None => {
+                let ask = self.port().ask(destination, &said, &options);
+                Call::new(self.port(), ask, options).run(&mut give_up, take)
+            }
         };
         if self.is_shut() {
             self.close();
@@ -206,6 +220,17 @@ impl Bus {
     pub fn set_meanings(&self, unit: UnitAddress, meanings: Meanings) {
         if self.port().is_of_this_process() {
             self.port().meanings.set(unit, meanings);
+        }
+    }
+
+    /// Says which protocol `unit` speaks, for every call from now on: until then it is Modbus.
+    ///
+    /// To a unit that speaks another one nothing of Modbus is sent, and what that protocol has nothing for is refused
+    /// ([`Failure::NotSpoken`]). Callers go on asking for registers: which of them stands for what,
+    /// [`Huanyang`](drivebus_rtu::huanyang::Huanyang) says. In a forked child nothing is set.
+    pub fn set_protocol(&self, unit: UnitAddress, protocol: Protocol) {
+        if self.port().is_of_this_process() {
+            self.port().spoken.set(unit, protocol);
         }
     }
 
@@ -320,7 +345,8 @@ impl Bus {
     /// `None` where nobody would find it: the port is of no kind that programs share, or the system gives no place. What
     /// closes the bus leaves it to be carried out.
     pub fn leave_will(&self, will: LastWill) -> Option<u64> {
-        (self.port().is_of_this_process() && !self.is_shut()).then(|| self.port().wills.leave(will)).flatten()
+        let leave = || self.port().wills.leave(self.port().spoken.will(will));
+        (self.port().is_of_this_process() && !self.is_shut()).then(leave).flatten()
     }
 
     /// Takes back the will that [`leave_will`](Self::leave_will) gave this number. In a forked child it stays the parent's.
@@ -339,7 +365,8 @@ impl Bus {
         will: LastWill,
         then: impl FnMut(bool, Option<&str>) + Send + 'static,
     ) -> Option<u64> {
-        (!self.is_closed()).then(|| self.port().wills.leave_for(client, will, Box::new(then))).flatten()
+        let leave = || self.port().wills.leave_for(client, self.port().spoken.will(will), Box::new(then));
+        (!self.is_closed()).then(leave).flatten()
     }
 
     /// Carries out now the will of this number.

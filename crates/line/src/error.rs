@@ -6,6 +6,7 @@ pub(crate) mod kind;
 use std::fmt;
 use std::time::Duration;
 
+use drivebus_rtu::huanyang::{Huanyang, Protocol};
 use drivebus_rtu::{
     AnswerError, BeginError, Destination, ExceptionCode, Frame, FrameError, Instant, Meaning, Request, Table,
     Unanswered,
@@ -26,6 +27,8 @@ pub struct CallError {
     pub destination: Destination,
     /// The whole request frame.
     pub request: Vec<u8>,
+    /// In which protocol it is.
+    pub protocol: Protocol,
     /// The bytes that came instead of an answer.
     pub raw: Vec<u8>,
     /// When the request went out, on the line's clock; `None`: it never did, so nothing was done.
@@ -44,7 +47,10 @@ impl fmt::Display for CallError {
             Destination::Broadcast => f.write_str("broadcast")?,
         }
         let pdu = Frame::parse(&self.request).ok().map_or(&[][..], |frame| frame.pdu());
-        let request = Request::parse(pdu).ok();
+        let request = match self.protocol {
+            Protocol::Modbus => Request::parse(pdu).ok(),
+            Protocol::Huanyang => Huanyang::parse(pdu).map(Request::Huanyang),
+        };
         if let Some(request) = request {
             write!(f, ", {}", Asked { request, pdu })?;
         }
@@ -139,6 +145,7 @@ impl fmt::Display for Asked<'_> {
             Request::ReadIdentification { object, .. } => {
                 write!(f, "read its identification (2BH/0EH) from object {object:02X}H")
             }
+            Request::Huanyang(asked) => write!(f, "{asked}"),
             _ => write!(f, "PDU {}", Hex(self.pdu)),
         }
     }
@@ -190,6 +197,15 @@ pub enum Failure {
     NotARead {
         /// The function asked for.
         function: u8,
+    },
+    /// The unit is known to speak another protocol, which has nothing for this request. Nothing was sent.
+    #[error(
+        "unit {unit} is named as a drive that speaks Huanyang's own protocol, which has nothing for this request, and nothing \
+         of Modbus is sent to it"
+    )]
+    NotSpoken {
+        /// The unit.
+        unit: u8,
     },
     /// As many wait for the line as may. Nothing was sent.
     #[error("{room} requests wait for this line already, and no more may; nothing was sent")]

@@ -21,6 +21,7 @@
 //! `Spindles/VFD/HuanyangProtocol.cpp`; Dema D5M manual, pp. 68 to 72, a drive with the same protocol (silence, bits of
 //! the control, the status read with one byte); *Huanyang VFD modbus protocol*, notes after the maker's manual (refusals).
 
+use core::fmt;
 use core::time::Duration;
 
 use crate::answer::{Answer, AnswerError, Head, MOST};
@@ -117,6 +118,17 @@ pub enum Huanyang {
         /// In 0.01 Hz.
         value: u16,
     },
+}
+
+/// The request that `pdu` is, of Modbus or, where it is none of that, of this protocol.
+///
+/// For what was written down as bytes, such as what halts a unit: a control and a frequency have no form of Modbus. A read of
+/// a parameter, and a write, may have one.
+pub fn request_of(pdu: &[u8]) -> Option<Request<'_>> {
+    match Request::parse(pdu) {
+        Ok(request) => Some(request),
+        Err(_) => Huanyang::parse(pdu).map(Request::Huanyang),
+    }
 }
 
 impl Huanyang {
@@ -285,6 +297,18 @@ impl Huanyang {
             Self::SetFrequency { .. } => 0,
         };
         [self.function() | EXCEPTION_BIT, 1, number]
+    }
+}
+
+impl fmt::Display for Huanyang {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::ReadParameter { number } => write!(f, "read PD{number:03}"),
+            Self::WriteParameter { number, value } => write!(f, "write {value} ({value:04X}H) to PD{number:03}"),
+            Self::Control { bits } => write!(f, "control {bits:02X}H"),
+            Self::ReadStatus { number } => write!(f, "read status {number}"),
+            Self::SetFrequency { value } => write!(f, "set the frequency to {value} ({value:04X}H)"),
+        }
     }
 }
 

@@ -37,7 +37,7 @@ impl Shown {
         match self {
             Self::NoFault => !look.is_tripped() && (is_untold || look.state != State::Unknown),
             Self::Turns(_) | Self::TurnsRound { .. } if is_untold => !look.has_fault(),
-            Self::Turns(wanted) | Self::TurnsRound { wanted, .. } => look.state == wanted,
+            Self::Turns(wanted) | Self::TurnsRound { wanted, .. } => look.state.shows(wanted),
         }
     }
 }

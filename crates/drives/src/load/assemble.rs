@@ -193,6 +193,7 @@ fn name(file: &File, name: &Placed<String>, problems: &mut Problems) -> Option<S
 
 fn read_requests(file: &File, requests: &manifest::Requests) -> Result<Requests, super::ProfileError> {
     Ok(Requests {
+        protocol: requests.protocol,
         functions: requests.functions.clone(),
         max_words: facts::within(file, &requests.max_words, 1, 125, "max_words")?,
         joined: requests.joined.as_ref().map(|source| source.get_ref().clone()),

@@ -9,6 +9,7 @@ use super::problems::Problems;
 use crate::bits::BitField;
 use crate::entry::{Access, Entry};
 use crate::parts::memory::Memory;
+use crate::parts::rules::Protocol;
 use crate::parts::setpoint::Setpoint;
 use crate::place::{Place, Table};
 use crate::profile::Profile;
@@ -19,6 +20,7 @@ pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problem
     words(file, profile, problems);
     setpoints(file, profile, problems);
     functions(file, manifest, profile, problems);
+    protocol(file, manifest, profile, problems);
     sequence(file, profile, problems);
     if profile.fault_holds() && !(profile.state_tells_fault() && profile.role("fault").is_some()) {
         let reason = "\"fault_holds\" needs a register of the fault, and a state that says when the drive is in fault";
@@ -99,6 +101,30 @@ fn setpoints(file: &File, profile: &Profile, problems: &mut Problems) {
         if let Some(place) = place.filter(|&place| taken(place)) {
             let reason = format!("{} is at {place}, where a word can start a motor", role.register);
             problems.add(file, 1, format!("{reason}: no setpoint can be there"));
+        }
+    }
+}
+
+/// Huanyang's protocol has nothing but what these addresses stand for, a word at a time.
+fn protocol(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
+    if profile.requests().protocol != Protocol::Huanyang {
+        return;
+    }
+    let place = manifest.requests.as_ref().map_or(1, |requests| line(file, &requests.max_words));
+    if profile.max_words() != 1 {
+        problems.add(file, place, "Huanyang's protocol has one word in a request: \"max_words\" must be 1");
+    }
+    for entry in &profile.entries {
+        let Some(Place { table, address }) = entry.place() else { continue };
+        let fits = table == Table::Holding
+            && entry.words() == 1
+            && match (address.to_be_bytes(), entry.access) {
+                ([0x01, _], _) | ([0x04, _], Access::Ro) | ([0x03 | 0x05, 0], Access::Wo) => true,
+                _ => false,
+            };
+        if !fits {
+            let has = "parameters at 0100H to 01FFH, read-only words at 0400H to 04FFH, and write-only ones at 0300H and 0500H";
+            problems.add(file, place, format!("Huanyang's protocol has {has}: {} is none of those", entry.name));
         }
     }
 }

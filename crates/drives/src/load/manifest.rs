@@ -16,7 +16,7 @@ use super::placed::Placed;
 use super::{File, ProfileError, line_of, shape};
 use crate::parts::fault::Means;
 use crate::parts::memory::MemoryBit;
-use crate::parts::rules::UnitKind;
+use crate::parts::rules::{Protocol, UnitKind};
 use crate::parts::setpoint::Setpoint;
 
 /// The rules of a family of drives. The long tables stand beside it: registers.csv, parameters.csv, faults.csv.
@@ -138,6 +138,9 @@ pub(super) struct Serial {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct Requests {
+    /// In which protocol it is asked: `"modbus"`, or `"huanyang"`.
+    #[serde(default)]
+    pub(super) protocol: Protocol,
     /// The function codes that it takes: `[0x03, 0x06]`.
     pub(super) functions: Vec<u8>,
     /// Most words in one request, 1 to 125.

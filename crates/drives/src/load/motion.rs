@@ -12,7 +12,7 @@ use super::words;
 use crate::entry::Access;
 use crate::parts::command::{Command, CommandCode};
 use crate::parts::rules::UnitKind;
-use crate::parts::state::{StateRule, StateWord};
+use crate::parts::state::{State, StateRule, StateWord};
 use crate::place::Place;
 use crate::profile::Profile;
 
@@ -218,7 +218,9 @@ pub(super) fn state(
     }
     let mut rules = by_bits(file, manifest, table, entries, problems);
     let Some(register) = entries.get_mut(file, &table.register, problems) else { return };
-    if !table.codes.is_empty() {
+    // Where each other word means something too, they are numbers.
+    let is_number = table.otherwise.is_some();
+    if !table.codes.is_empty() && !is_number {
         register.quantity.choices.clear();
     }
     for (&state, spanned) in &table.codes {
@@ -227,7 +229,8 @@ pub(super) fn state(
         if problems.keep(word).is_none() {
             continue;
         }
-        if let Some(other) = register.quantity.choices.insert(code, state.name().to_owned()) {
+        let listed = (!is_number).then(|| register.quantity.choices.insert(code, state.name().to_owned())).flatten();
+        if let Some(other) = listed {
             problems.add(file, line(file, spanned), format!("{} has the code of {other}", state.name()));
         }
         rules.push(StateRule { state, mask: u16::MAX, value: code });
@@ -235,6 +238,7 @@ pub(super) fn state(
     profile.state = Some(StateWord {
         register: register.name.clone(),
         rules,
+        otherwise: table.otherwise.unwrap_or(State::Unknown),
         rest_by_frequency: table.rest_by_frequency,
         verified: table.verified,
         note: table.note.clone(),

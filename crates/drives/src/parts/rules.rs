@@ -22,10 +22,36 @@ impl UnitKind {
     }
 }
 
+/// Which protocol a drive speaks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Protocol {
+    /// Modbus RTU.
+    #[default]
+    Modbus,
+    /// Huanyang's own: no Modbus, on the same wires and with the same CRC.
+    Huanyang,
+}
+
+impl Protocol {
+    /// Its name in profiles and programs: `modbus`, `huanyang`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Modbus => "modbus",
+            Self::Huanyang => "huanyang",
+        }
+    }
+}
+
 /// What a drive takes as a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Requests {
+    /// In which protocol it is asked. In Huanyang's the function is the high byte of a register's address: 01 a parameter, 03 the
+    /// control, 04 a status, 05 the frequency.
+    pub protocol: Protocol,
     /// The function codes that it takes.
     pub functions: Vec<u8>,
     /// Most words in one read or write, 1..=125.

@@ -12,6 +12,8 @@ pub enum State {
     Forward,
     /// It turns in reverse.
     Reverse,
+    /// It turns; which way is not told.
+    Running,
     /// It is stopped.
     Stopped,
     /// The drive tripped; the fault register says why.
@@ -27,8 +29,16 @@ pub enum State {
 
 impl State {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Forward, Self::Reverse, Self::Stopped, Self::Fault, Self::PowerOff, Self::PreExciting, Self::Unknown];
+    pub const ALL: [Self; 8] = [
+        Self::Forward,
+        Self::Reverse,
+        Self::Running,
+        Self::Stopped,
+        Self::Fault,
+        Self::PowerOff,
+        Self::PreExciting,
+        Self::Unknown,
+    ];
 
     /// The state of that [`name`](Self::name).
     pub fn named(name: &str) -> Option<Self> {
@@ -37,7 +47,12 @@ impl State {
 
     /// Whether the drive feeds the motor with the aim of turning it.
     pub const fn is_running(self) -> bool {
-        matches!(self, Self::Forward | Self::Reverse)
+        matches!(self, Self::Forward | Self::Reverse | Self::Running)
+    }
+
+    /// Whether a motor that is to turn as `wanted` says shows this: that way, or running with nothing said of it.
+    pub fn shows(self, wanted: Self) -> bool {
+        self == wanted || (self == Self::Running && wanted.is_running())
     }
 
     /// Whether the drive feeds the motor nothing.
@@ -50,6 +65,7 @@ impl State {
         match self {
             Self::Forward => "forward",
             Self::Reverse => "reverse",
+            Self::Running => "running",
             Self::Stopped => "stopped",
             Self::Fault => "fault",
             Self::PowerOff => "power_off",
@@ -67,6 +83,8 @@ pub struct StateWord {
     pub register: String,
     /// Which words mean which state: of those that fit, one that runs, else the first.
     pub rules: Vec<StateRule>,
+    /// What each other word means.
+    pub otherwise: State,
     /// Whether the word may say that the motor rests while it slows down, so that its frequency has to say so, too.
     pub rest_by_frequency: bool,
     /// Whether a document of this family prints it.
@@ -102,7 +120,7 @@ impl StateWord {
         match fitting.next() {
             Some(rule) if rule.state.is_at_rest() && self.may_run(raw, *rule) => State::Unknown,
             Some(rule) => rule.state,
-            None => State::Unknown,
+            None => self.otherwise,
         }
     }
 

@@ -7,6 +7,7 @@
 use std::fmt;
 use std::sync::Arc;
 
+use drivebus_rtu::huanyang::Protocol;
 use drivebus_rtu::{Adu, Answer, AnswerLength, Destination, Frame, Instant, Request};
 
 use crate::ask::Done;
@@ -150,6 +151,7 @@ impl Errand {
             failure,
             destination,
             request,
+            protocol: Protocol::Modbus,
             raw: Vec::new(),
             sent: None,
             ended,

@@ -2,12 +2,14 @@
 
 use std::time::Duration;
 
+use drivebus_rtu::huanyang::request_of;
 use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::bus::call::Call;
 use crate::bus::errand::pdu_of;
 use crate::bus::port::Port;
 use crate::bus::shared::Shared;
+use crate::bus::spoken;
 use crate::bus::wills::CarriesOut;
 use crate::error::{CallError, Failure};
 use crate::options::CallOptions;
@@ -52,6 +54,13 @@ impl CarriesOut for Shared {
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<(), Box<CallError>> {
         let ask = self.port.ask(unit.into(), request, &options);
+        let said = match self.port.spoken.say(unit.into(), request) {
+            Ok(said) => said,
+            Err(failure) => return Err(ask.failed(failure, None, self.port.now_if_known(), &[])),
+        };
+        let options = spoken::options_for(&said, options);
+        let ask = self.port.ask(unit.into(), &said, &options);
+        let take = &mut |answer: Answer<'_>| spoken::tell(&said, request, answer, take);
         Call::new(&self.port, ask, options).run(&mut || self.port.is_shut(), take).map(drop)
     }
 
@@ -86,7 +95,7 @@ fn is_another(port: &Port, unit: UnitAddress, (question, others): &(Vec<u8>, Vec
 /// Halts the unit in one of the ways of `will`.
 fn halt(port: &Port, unit: UnitAddress, will: &Will, way: usize) -> Result<(), Failure> {
     for pdu in will.ways.get(way).into_iter().flatten() {
-        let Ok(request) = Request::parse(pdu) else { continue };
+        let Some(request) = request_of(pdu) else { continue };
         let options = CallOptions::new().urgent(&request).timeout(Duration::from_nanos(will.timeout)).retries(0);
         let options = CallOptions { priority: Some(Priority::Stop), ..options };
         let ask = port.ask(unit.into(), &request, &options);

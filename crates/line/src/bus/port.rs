@@ -7,7 +7,7 @@ use std::fmt;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use drivebus_rtu::{BeginError, Destination, FreshWords, Instant, Request, UnitAddress};
+use drivebus_rtu::{BeginError, Destination, FreshWords, Instant, Request, UnitAddress, huanyang};
 
 use crate::ask::Ask;
 use crate::bus::clock::Clock;
@@ -16,6 +16,7 @@ use crate::bus::figures::Figures;
 use crate::bus::halts_told::HaltsTold;
 #[cfg(any(feature = "tcp", all(any(unix, windows), feature = "share")))]
 use crate::bus::programs::Programs;
+use crate::bus::spoken::Spoken;
 use crate::bus::wills::Wills;
 use crate::error::Failure;
 use crate::options::{BusOptions, CallOptions, UnitOptions};
@@ -45,6 +46,8 @@ pub(crate) struct Port {
     pub(super) halts: HaltsTold,
     /// What its units say by their exceptions.
     pub(crate) meanings: Arc<UnitMeanings>,
+    /// In which protocol they are asked.
+    pub(super) spoken: Spoken,
     pub(super) words: FreshWords,
     notes: Mutex<Vec<String>>,
     /// What the system refused to the threads of the bus's own.
@@ -82,6 +85,7 @@ impl Port {
             figures,
             halts: HaltsTold::new(),
             meanings: Arc::clone(&owner.meanings),
+            spoken: Spoken::default(),
             words,
             notes: Mutex::new(owner.line().map(|line| line.notes()).unwrap_or_default()),
             priority_refused: OnceLock::new(),
@@ -189,6 +193,10 @@ impl Port {
         let (timeout, gap) = match destination {
             Destination::Broadcast => (self.options.turnaround, Duration::ZERO),
             Destination::Unit(_) => (set.timeout.unwrap_or(self.options.timeout), set.gap.unwrap_or_default()),
+        };
+        let gap = match request {
+            Request::Huanyang(_) => gap.max(huanyang::SILENCE),
+            _ => gap,
         };
         let learns = self.options.learn_timeout || options.priority == Some(Priority::Poll);
         Ask {

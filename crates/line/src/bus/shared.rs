@@ -4,7 +4,7 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 use std::sync::Arc;
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, FreshWords};
+use drivebus_rtu::{Answer, FreshWords, Request};
 
 use crate::ask::Done;
 use crate::bus::call::Call;
@@ -13,6 +13,7 @@ use crate::bus::figures::Figures;
 use crate::bus::openings::Openings;
 use crate::bus::port::Port;
 use crate::bus::sharing::Sharing;
+use crate::bus::spoken;
 use crate::bus::wills::Wills;
 use crate::error::{CallError, Failure};
 use crate::line::Opener;
@@ -95,10 +96,23 @@ impl Shared {
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Option<Result<Done, Box<CallError>>> {
         let request = errand.request(|| self.port.words.next())?;
-        let ask = self.port.ask(errand.destination, &request, &errand.options);
-        let mut call =
-            Call::new(&self.port, ask, errand.options).of_program(errand.program).while_wanted(&*errand.wanted);
+        let said = match self.said(errand, &request) {
+            Ok(said) => said,
+            Err(error) => return Some(Err(error)),
+        };
+        let options = spoken::options_for(&said, errand.options);
+        let ask = self.port.ask(errand.destination, &said, &options);
+        let mut call = Call::new(&self.port, ask, options).of_program(errand.program).while_wanted(&*errand.wanted);
+        let take = &mut |answer: Answer<'_>| spoken::tell(&said, &request, answer, take);
         Some(call.run_in(turn, &mut || self.port.is_shut(), take))
+    }
+
+    /// `request` of `errand` as its unit takes it.
+    pub(super) fn said<'r>(&self, errand: &Errand, request: &Request<'r>) -> Result<Request<'r>, Box<CallError>> {
+        self.port.spoken.say(errand.destination, request).map_err(|failure| {
+            let ask = self.port.ask(errand.destination, request, &errand.options);
+            ask.failed(failure, None, self.port.now_if_known(), &[])
+        })
     }
 
     /// What people should know about the line, and about who shares it.

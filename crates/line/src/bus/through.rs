@@ -8,6 +8,7 @@ use crate::ask::{Ask, Done};
 use crate::bus::call::Call;
 use crate::bus::errand::Errand;
 use crate::bus::shared::Shared;
+use crate::bus::spoken;
 use crate::error::{CallError, Failure};
 use crate::health::link::Link;
 use crate::health::stats::Stats;
@@ -64,7 +65,12 @@ impl Shared {
                 Err(Lost::Unsent) => sharing.lost(&guest),
                 Err(Lost::Unknown) => {
                     sharing.lost(&guest);
-                    if !matches!(ask.request, Request::Read { .. }) || retries == 0 {
+                    let is_read = match ask.request {
+                        Request::Read { .. } => true,
+                        Request::Huanyang(asked) => !asked.is_write(),
+                        _ => false,
+                    };
+                    if !is_read || retries == 0 {
                         let why = format!("{}, through which the port was used, ended", guest.host());
                         return Err(self.lost_there(&ask, PortErrorKind::Lost, why, Some(began)));
                     }
@@ -211,8 +217,14 @@ impl Shared {
             drop(turn);
         }
         let request = errand.request(|| self.fresh_word())?;
+        let said = match self.said(errand, &request) {
+            Ok(said) => said,
+            Err(error) => return Some(Err(error)),
+        };
+        let options = spoken::options_for(&said, errand.options);
         let mut give_up = || self.port.is_shut() || !errand.is_wanted();
-        Some(self.call_shared(errand.destination, &request, errand.options, &mut give_up, take))
+        let take = &mut |answer: Answer<'_>| spoken::tell(&said, &request, answer, take);
+        Some(self.call_shared(errand.destination, &said, options, &mut give_up, take))
     }
 
     pub(super) fn listen(

@@ -42,6 +42,7 @@ impl Failure {
             Self::NotBegun(_)
             | Self::ReadOnly { .. }
             | Self::NotARead { .. }
+            | Self::NotSpoken { .. }
             | Self::QueueFull { .. }
             | Self::BeingStopped { .. }
             | Self::Halted { .. } => ErrorKind::NotAllowed,

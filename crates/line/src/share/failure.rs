@@ -130,6 +130,8 @@ impl From<&Failure> for Said {
             | Failure::Corrupt(_)
             | Failure::Unheard { .. }
             | Failure::OthersAsk
+            // Each program says its requests in its units' protocol before it hands them over.
+            | Failure::NotSpoken { .. }
             | Failure::Elsewhere { .. } => Self::BadAnswer { message: failure.to_string() },
         }
     }

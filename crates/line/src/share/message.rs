@@ -5,6 +5,7 @@
 
 use std::time::Duration;
 
+use drivebus_rtu::huanyang::Huanyang;
 use drivebus_rtu::{
     Adu, AnswerLength, DataBits, Destination, ExceptionCode, Instant, Meaning, Meanings, Parity, Request, SerialFormat,
     StopBits, UnitAddress,
@@ -22,7 +23,7 @@ use crate::turns::order::Priority;
 /// How every greeting begins, of every version.
 pub(crate) const GREETING: &[u8] = b"drivebus share ";
 /// What is spoken here.
-pub(crate) const VERSION: u8 = 8;
+pub(crate) const VERSION: u8 = 9;
 /// The first byte of an answer to a greeting that lets in; a [`Welcome`] follows.
 pub(crate) const LET_IN: u8 = 0;
 /// The first byte of one that does not; the reason follows, in words.
@@ -174,6 +175,8 @@ enum Length {
     /// The request is carried as it is; its answer has so many bytes, or ends when the line falls silent.
     Bytes(u8),
     BySilence,
+    /// It is none of Modbus.
+    AsHuanyangs,
 }
 
 /// One call as it is handed over: with the times and the rules of the program that wants it.
@@ -210,6 +213,7 @@ impl Order {
             answer: match *ask.request {
                 Request::Custom { answer: AnswerLength::Bytes(count), .. } => Length::Bytes(count),
                 Request::Custom { .. } => Length::BySilence,
+                Request::Huanyang(_) => Length::AsHuanyangs,
                 _ => Length::AsItsFunction,
             },
             timeout: nanos(ask.timeout),
@@ -251,6 +255,7 @@ impl Order {
             Length::Bytes(count) => Request::custom(&self.pdu, AnswerLength::Bytes(count)),
             Length::BySilence => Request::custom(&self.pdu, AnswerLength::BySilence),
             Length::AsItsFunction => Request::parse(&self.pdu),
+            Length::AsHuanyangs => return Huanyang::parse(&self.pdu).map(Request::Huanyang),
         }
         .ok()
     }

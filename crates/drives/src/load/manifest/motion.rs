@@ -131,6 +131,8 @@ pub(in crate::load) struct States {
     /// By bits: the first that fits.
     #[serde(default)]
     pub(in crate::load) when: Vec<Placed<When>>,
+    /// What each other word means, such as `"running"` where the register counts how fast the motor turns.
+    pub(in crate::load) otherwise: Option<State>,
     /// Whether a motor only rests once its output frequency is zero, too: the word may say so while it slows down.
     #[serde(default)]
     pub(in crate::load) rest_by_frequency: bool,

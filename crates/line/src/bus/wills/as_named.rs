@@ -3,6 +3,7 @@
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
+use drivebus_rtu::huanyang::Protocol;
 use drivebus_rtu::{Adu, Answer, Instant, Request, UnitAddress};
 
 use crate::bus::wills::{CarriesOut, Told, Wills};
@@ -89,11 +90,16 @@ impl HaltLine for KeptLine<'_> {
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<(), Box<CallError>> {
         let Some(bus) = self.open() else {
-            let (destination, failure) = (self.unit.into(), Failure::Closed);
-            let request = Adu::request(destination, request).as_bytes().to_vec();
-            let raw = Vec::new();
-            let error = CallError { failure, destination, request, raw, sent: None, ended: None, set_again: None };
-            return Err(Box::new(error));
+            return Err(Box::new(CallError {
+                failure: Failure::Closed,
+                destination: self.unit.into(),
+                request: Adu::request(self.unit.into(), request).as_bytes().to_vec(),
+                protocol: Protocol::Modbus,
+                raw: Vec::new(),
+                sent: None,
+                ended: None,
+                set_again: None,
+            }));
         };
         bus.ask(self.unit, request, options.urgent(request), take)
     }
