@@ -234,7 +234,7 @@ class Bus(BusFace, Requests):
         known, code = at_once(profile_of(BlockingBus(self), unit, profile, variants, unverified, urgent))
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._opening.known.add(unit, known, unverified=unverified)
-        self._native.set_meanings(unit, native_of(known))
+        self._native.set_profile(unit, native_of(known))
         return drive
 
     @overload

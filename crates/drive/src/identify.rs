@@ -8,8 +8,8 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use drivebus_drives::{Entry, Evidence, Identification as Row, Place};
-use drivebus_rtu::huanyang::Protocol;
 use drivebus_rtu::UnitAddress;
+use drivebus_rtu::huanyang::Protocol;
 
 use crate::answer::{Answer, Said};
 use crate::asked::{NotTold, answer_at, is_unreached};

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use drivebus_drive::protocol;
 use drivebus_line::{
     Bus as CoreBus, CallOptions, Counters, Done, Failure, Hint, LastWill, PortError, PortErrorKind, UnitOptions,
 };
@@ -257,8 +258,10 @@ impl Bus {
     }
 
     #[pyo3(signature = (unit, profile, /))]
-    fn set_meanings(&self, unit: &Bound<'_, PyAny>, profile: &Profile) -> PyResult<()> {
-        self.core.set_meanings(any_unit(unit)?, profile.meanings());
+    fn set_profile(&self, unit: &Bound<'_, PyAny>, profile: &Profile) -> PyResult<()> {
+        let unit = any_unit(unit)?;
+        self.core.set_meanings(unit, profile.meanings());
+        self.core.set_protocol(unit, protocol(&profile.core()));
         Ok(())
     }
 

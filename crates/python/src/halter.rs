@@ -11,6 +11,7 @@ use drivebus_drive::task::{
 use drivebus_drive::{Besides, Families, Halt, Looks, NotHalted, Order, Record, SameUnit, Speeds, Taken, Why};
 use drivebus_drives::{self as drives, Command, Place};
 use drivebus_line::{CallError, CallOptions, ErrorKind, Failure, HaltLine, Halted, Halter, Named};
+use drivebus_rtu::huanyang::{Huanyang, Protocol};
 use drivebus_rtu::{Answer, Instant, Meaning, Request, Table, UnitAddress};
 use pyo3::prelude::*;
 
@@ -43,7 +44,7 @@ impl Halter for ByFamily {
             let done = halt.carry_out(&line, families).await;
             (halt.taken_as().clone(), done)
         });
-        let Some(((taken_as, done), was_told)) = driven(task, line) else { return Halted::Unknown };
+        let Some(((taken_as, done), was_told)) = driven(task, line, family.protocol()) else { return Halted::Unknown };
         let as_what = if taken_as.same().family().name() == named.family {
             String::new()
         } else {
@@ -80,7 +81,7 @@ pub(crate) fn as_named(given: Option<GivenName<'_>>) -> Option<Named> {
 }
 
 /// Does what a halt wishes for. What came of it, and whether others may ask the unit since; `None`: it cannot be done here.
-fn driven<T>(mut task: Task<T, Failed>, line: &mut dyn HaltLine) -> Option<(T, bool)> {
+fn driven<T>(mut task: Task<T, Failed>, line: &mut dyn HaltLine, protocol: Protocol) -> Option<(T, bool)> {
     let (mut latest, mut outcome) = (Instant::ZERO, None);
     let (mut is_taken, mut was_told) = (false, false);
     loop {
@@ -101,7 +102,7 @@ fn driven<T>(mut task: Task<T, Failed>, line: &mut dyn HaltLine) -> Option<(T, b
                     }
                 };
                 let asked = unix_time();
-                match line.ask(&request, options_of(&read), &mut take) {
+                match said(line, protocol, &request, options_of(&read), &mut take) {
                     Ok(()) if read.is_stamped => Outcome::Stamped(Stamped { words, asked, answered: unix_time() }),
                     Ok(()) => Outcome::Words(words),
                     Err(error) => Outcome::Failed(Failed::of(error, &task)),
@@ -109,7 +110,7 @@ fn driven<T>(mut task: Task<T, Failed>, line: &mut dyn HaltLine) -> Option<(T, b
             }
             Step::Wish(Wish::Write(write)) => {
                 is_taken = false;
-                let came = line.ask(&request_of(&write)?, options_of_write(&write), &mut |_| ());
+                let came = said(line, protocol, &request_of(&write)?, options_of_write(&write), &mut |_| ());
                 came.map_or_else(|error| Outcome::Failed(Failed::of(error, &task)), |()| Outcome::Written)
             }
             Step::Wish(Wish::Tell(notice)) => {
@@ -126,6 +127,22 @@ fn driven<T>(mut task: Task<T, Failed>, line: &mut dyn HaltLine) -> Option<(T, b
             }
             Step::Wish(_) => return None,
         });
+    }
+}
+
+/// Asks in the protocol of the family, which the line itself may not know.
+fn said(
+    line: &mut dyn HaltLine,
+    protocol: Protocol,
+    request: &Request<'_>,
+    options: CallOptions,
+    take: &mut dyn FnMut(Answer<'_>),
+) -> Result<(), Box<CallError>> {
+    match Huanyang::of(request).filter(|_| protocol == Protocol::Huanyang) {
+        Some(asked) => line.ask(&Request::Huanyang(asked), options, &mut |answer| {
+            take(asked.as_answered(answer, request, &mut [0]));
+        }),
+        None => line.ask(request, options, take),
     }
 }
 

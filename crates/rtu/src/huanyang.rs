@@ -271,10 +271,15 @@ impl Huanyang {
         Answer::read(word).unwrap_or(answer)
     }
 
-    /// The PDU by which a unit answers: a read by `word`, a control by the bits of `state`. Returns its length.
-    pub fn answer(self, word: u16, state: u8, target: &mut [u8; MAX_PDU]) -> usize {
+    /// The PDU by which a unit answers: a read of a parameter by `word`, in one byte where it `fits_a_byte`, a control by the bits of
+    /// `state`. Returns its length.
+    pub fn answer(self, word: u16, fits_a_byte: bool, state: u8, target: &mut [u8; MAX_PDU]) -> usize {
         let [high, low] = word.to_be_bytes();
         match self {
+            Self::ReadParameter { number } if fits_a_byte => {
+                target[..4].copy_from_slice(&[READ_PARAMETER, 2, number, low]);
+                4
+            }
             Self::ReadParameter { number } | Self::ReadStatus { number } => {
                 target[..5].copy_from_slice(&[self.function(), 3, number, high, low]);
                 5
@@ -532,7 +537,7 @@ mod tests {
                 let silent = slave.deadline().unwrap_or(Instant::ZERO);
                 assert_eq!(slave.poll(silent), Some(SlaveEvent::Request { request, broadcast: false }));
                 let mut pdu = [0; MAX_PDU];
-                let len = asked.answer(word, 0x09, &mut pdu);
+                let len = asked.answer(word, word <= 0xFF, 0x09, &mut pdu);
                 assert_eq!(request.judge(&pdu[..len]), Ok(Answer::Custom { pdu: &pdu[..len] }));
                 assert!(matches!(request.judge(&asked.refusal()), Ok(Answer::Exception { .. })));
             }

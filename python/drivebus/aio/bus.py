@@ -287,7 +287,7 @@ class Bus(BusFace):
         known, code = await profile_of(self, unit, profile, variants, unverified, urgent)
         drive = Drive(self, unit, known, code, unverified=unverified, trust_profile=trust_profile)
         self._opening.known.add(unit, known, unverified=unverified)
-        self._core().set_meanings(unit, native_of(known))
+        self._core().set_profile(unit, native_of(known))
         return drive
 
     @documented_by(BlockingFace.stop_all)

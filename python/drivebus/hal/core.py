@@ -189,7 +189,8 @@ class Spindle:
         linked = self.linked(now)
         look = self._look or Shown(now)
         frequency = abs(look.frequency or 0.0)
-        speed = math.copysign(frequency, -1.0 if look.state is State.REVERSE else 1.0) * self._scale.rpm_per_hz
+        state = self._way(look)
+        speed = math.copysign(frequency, -1.0 if state is State.REVERSE else 1.0) * self._scale.rpm_per_hz
         stopped = linked and look.stands
         return {
             "speed-feedback": speed,
@@ -197,8 +198,8 @@ class Spindle:
             "frequency-out": frequency,
             "at-speed": linked and self._is_at_speed(look),
             "stopped": stopped,
-            "forward": linked and look.state is State.FORWARD,
-            "reverse": linked and look.state is State.REVERSE,
+            "forward": linked and state is State.FORWARD,
+            "reverse": linked and state is State.REVERSE,
             "brake": stopped and self.told is None,
             "fault": look.tripped or bool(self.trouble),
             "fault-code": look.fault,
@@ -299,10 +300,16 @@ class Spindle:
             return False
         return look.time - since > PATIENCE
 
+    def _way(self, look: Shown) -> State:
+        """The state; of a drive that tells no direction, the one that it was told last."""
+        if look.state is not State.RUNNING or self.told is None:
+            return look.state
+        return State.REVERSE if self.told.reverse else State.FORWARD
+
     def _is_at_speed(self, look: Shown) -> bool:
         if self.told is None or self.told != self._wanted or look.frequency is None:
             return False
-        if look.state is not (State.REVERSE if self.told.reverse else State.FORWARD):
+        if self._way(look) is not (State.REVERSE if self.told.reverse else State.FORWARD):
             return False
         wanted = self.told.word / self.counts
         return abs(abs(look.frequency) - wanted) <= max(self._scale.tolerance * wanted, STANDSTILL)

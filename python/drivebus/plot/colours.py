@@ -7,6 +7,7 @@ __all__ = ["CURVES", "EVENTS", "GAP", "band_colour"]
 _STATES = {
     "forward": "#2e9e4f",
     "reverse": "#1f77b4",
+    "running": "#17a2a2",
     "stopped": "#b8b8b8",
     "fault": "#d62728",
     "power off": "#555555",

@@ -12,6 +12,8 @@ class State(str, Enum):
 
     FORWARD = "forward"
     REVERSE = "reverse"
+    RUNNING = "running"
+    """It turns; the drive does not tell which way."""
     STOPPED = "stopped"
     FAULT = "fault"
     POWER_OFF = "power_off"
@@ -21,7 +23,7 @@ class State(str, Enum):
     @property
     def running(self) -> bool:
         """Whether the drive feeds the motor in order to turn it."""
-        return self in (State.FORWARD, State.REVERSE)
+        return self in (State.FORWARD, State.REVERSE, State.RUNNING)
 
     @property
     def at_rest(self) -> bool:

@@ -3,7 +3,8 @@
 //! A request is judged as a whole before any of it is done.
 //! Assumption: the manual does not say what a drive does with a 10H request of which one word is refused.
 
-use drivebus_rtu::{Adu, Answer, ExceptionCode, Instant, Request, RequestError, Table, Words, function};
+use drivebus_rtu::huanyang::{Huanyang, Protocol};
+use drivebus_rtu::{Adu, Answer, ExceptionCode, Instant, MAX_PDU, Request, RequestError, Table, Words, function};
 
 use super::family::{Memory, Range};
 use super::machine::{Command, Direction, RunState};
@@ -42,6 +43,9 @@ impl Drive {
     ///
     /// `None`: the PDU is empty or an exception, so that it is somebody's answer and no request.
     pub(crate) fn handle(&mut self, now: Instant, pdu: &[u8]) -> Option<Adu> {
+        if self.family().roles.protocol == Protocol::Huanyang {
+            return self.handle_huanyangs(now, pdu);
+        }
         let function = self.hear(now, pdu)?;
         let mut words = [0; MOST_WORDS];
         let answer = match Request::parse(pdu) {
@@ -54,6 +58,49 @@ impl Drive {
         };
         let answer = answer.unwrap_or_else(|refusal| Answer::exception(function, self.exception(refusal)));
         Some(Adu::answer(self.unit, &answer))
+    }
+
+    /// The same in Huanyang's protocol; on anything else the drive is silent.
+    fn handle_huanyangs(&mut self, now: Instant, pdu: &[u8]) -> Option<Adu> {
+        let asked = Huanyang::parse(pdu)?;
+        self.hear(now, pdu)?;
+        let (address, request) = match asked {
+            Huanyang::ReadParameter { number } => (0x0100 | u16::from(number), None),
+            Huanyang::ReadStatus { number } => (0x0400 | u16::from(number), None),
+            Huanyang::WriteParameter { number, value } => (0x0100 | u16::from(number), Some(value)),
+            Huanyang::Control { bits } => (0x0300, Some(bits.into())),
+            Huanyang::SetFrequency { value } => (0x0500, Some(value)),
+        };
+        let request = request.map_or(Request::read(address, 1).ok()?, |value| Request::write(address, value));
+        let (mut words, mut answer) = ([0; MOST_WORDS], [0; MAX_PDU]);
+        let told = self.carry_out(now, &request, &mut words).map(|_| ());
+        let len = match told {
+            Ok(()) => asked.answer(words[0], self.fits_a_byte(address), self.told_state(), &mut answer),
+            Err(_) => {
+                let refusal = asked.refusal();
+                answer[..refusal.len()].copy_from_slice(&refusal);
+                refusal.len()
+            }
+        };
+        Some(Adu::answer(self.unit, &Answer::custom(&answer[..len]).ok()?))
+    }
+
+    /// Whether no value of the parameter at `address` needs two bytes.
+    fn fits_a_byte(&self, address: u16) -> bool {
+        match self.map.word(address.into()) {
+            Some(Word::Parameter(parameter)) => parameter.bounds.high.is_some_and(|high| high <= 0xFF),
+            _ => false,
+        }
+    }
+
+    /// What the drive does, as it answers a control. D5M manual, p. 72: 0 operation, 1 jogging, 2 reverse, as told; 3 to 5 the same,
+    /// as it is.
+    fn told_state(&self) -> u8 {
+        let is_running = self.machine.is_running();
+        let (runs, jogs) = (is_running && !self.machine.is_jogging(), is_running && self.machine.is_jogging());
+        let reverse = self.machine.state() == RunState::Reverse;
+        let bits = [runs, jogs, reverse].map(u8::from);
+        (bits[0] | bits[1] << 1 | bits[2] << 2) * 0b1001
     }
 
     /// A request has come: its function. `None`: it is none.

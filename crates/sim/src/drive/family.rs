@@ -27,6 +27,7 @@ mod gd350;
 mod gd600;
 mod h100;
 mod handshake;
+mod huanyang;
 mod j1000;
 mod md500;
 mod ms300;
@@ -152,7 +153,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 36] = [
+const FAMILIES: [fn() -> Family; 37] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -189,6 +190,7 @@ const FAMILIES: [fn() -> Family; 36] = [
     wj200::wj200,
     vf_s15::vf_s15,
     h100::h100,
+    huanyang::huanyang,
 ];
 
 impl Family {

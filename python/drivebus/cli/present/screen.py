@@ -28,7 +28,7 @@ _RATED = 20
 MARKS = {"unverified": "?", "assumed": "!"}
 """What stands behind a value that is not proved, by its evidence."""
 
-_STYLES = {"fault": "bold red", "forward": "green", "reverse": "green"}
+_STYLES = {"fault": "bold red", "forward": "green", "reverse": "green", "running": "green"}
 
 
 @dataclass

@@ -3,6 +3,8 @@
 //! Parameter P*gg.ii* stands at *gg* × 100H + *ii* (section 9.4.5). Assumption: P14.04 and P14.05, which only manuals of
 //! sister series print, do here what they do there.
 
+use drivebus_rtu::huanyang::Protocol;
+
 use super::{
     Bit, Family, Faults, Kind, MAX_WORDS, MEMORY_BIT, Measure, Memory, Range, Register, Roles, Scaled, Shows, Silence,
     Speed, USUAL_DELAY, USUAL_MAX_HZ,
@@ -39,6 +41,7 @@ pub(crate) fn gd350() -> Family {
         elsewhere: Vec::new(),
         capped: &[UPPER_FREQUENCY, KEYPAD_FREQUENCY, JOG_FREQUENCY],
         roles: Roles {
+            protocol: Protocol::Modbus,
             // Assumption: 0 in P00.02 is Modbus; the digit is not printed.
             obeys: vec![(0x0001, 2), (0x0002, 0)],
             channel: Some(0x0001),

@@ -16,6 +16,7 @@ use drivebus_drives::{
     Access as ProfileAccess, BitField, Command as Told, Control, Entry, Kind as EntryKind, Place, Profile, Quantity,
     Setpoint, State, Table, UnitKind, Value,
 };
+use drivebus_rtu::huanyang::Protocol;
 
 use super::{
     Bit, Bounds, Deciding, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, Parameter, Range,
@@ -62,6 +63,10 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         max_frequency,
         handshake,
         reads_single_parameters: profile.requests().single_parameters,
+        protocol: match profile.requests().protocol {
+            drivebus_drives::Protocol::Huanyang => Protocol::Huanyang,
+            _ => Protocol::Modbus,
+        },
         ..own.roles()
     };
     let delay = profile.serial().map(|serial| u16::try_from(serial.response_delay.as_millis()).unwrap_or(u16::MAX));

@@ -1,10 +1,14 @@
 //! The parameters and registers at which a family behaves: who is obeyed, how fast, along which ramps.
 
+use drivebus_rtu::huanyang::Protocol;
+
 use super::{Bounds, Handshake};
 
 /// The places at which a family behaves, by address; `None` where it has no such parameter or nobody knows which.
 #[derive(Debug, Clone)]
 pub(crate) struct Roles {
+    /// Which protocol it speaks.
+    pub(crate) protocol: Protocol,
     /// Commands move something only while each of these parameters has this value.
     pub(crate) obeys: Vec<(u16, u16)>,
     /// Who gives the commands, as status words show it.
@@ -160,6 +164,7 @@ impl Silence {
 impl Roles {
     /// None of them.
     pub(crate) const NONE: Self = Self {
+        protocol: Protocol::Modbus,
         obeys: Vec::new(),
         channel: None,
         speed_source: None,
