@@ -236,6 +236,8 @@ class TestTraps:
     def test_no_word_that_a_scan_asks_for_looks_like_a_command(self) -> None:
         asked = {*codes.registers()}
         for profile in map(Profile.builtin, profiles()):
+            if profile.requests().protocol == "huanyang":
+                continue  # nobody is asked for its words in Modbus
             signature = profile.signature() or {"answers": [], "refuses": []}
             asked |= {*signature["answers"], *signature["refuses"]}
             state = profile.role("state")

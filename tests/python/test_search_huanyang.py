@@ -21,7 +21,7 @@ from .test_huanyang_asked import Drive
 from .test_search import FOUR, PORT, Wire, places
 
 needs_terminals = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals")
-SAID = "it speaks Huanyang's own protocol, which is no Modbus: drivebus has no command for it"
+SAID = "it speaks Huanyang's own protocol, which is no Modbus: name it huanyang-hy"
 ALL = [Settings(19200), *candidates(Settings(19200), full=False)]
 
 
@@ -186,7 +186,7 @@ class TestTheCommand:
         told = " ".join(done.stdout.split())
         assert done.exit_code == 0
         assert "unit 1 at 9600 8N1" in told or "1 9600 8N1" in told
-        assert "speaks Huanyang's own protocol, which is no Modbus: drivebus has no command for it" in told
+        assert "speaks Huanyang's own protocol, which is no Modbus: name it huanyang-hy" in told
         assert "info`" not in told, "nobody can talk to it"
         assert "unknown family" not in told
 

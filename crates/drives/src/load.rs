@@ -180,7 +180,7 @@ static BUILTINS: [Builtin; 37] = [
     builtin!("vf-s15": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("wj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("h100": "registers.csv" "parameters.csv" "faults.csv"),
-    builtin!("huanyang": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("huanyang-hy": "registers.csv" "parameters.csv" "faults.csv"),
 ];
 
 #[cfg(not(feature = "builtin-profiles"))]

@@ -83,6 +83,7 @@ fn bits<'py>(py: Python<'py>, entry: &Entry) -> PyResult<Option<Bound<'py, PyDic
 
 pub(crate) fn requests<'py>(py: Python<'py>, requests: &Requests) -> Table<'py> {
     let dict = PyDict::new(py);
+    dict.set_item("protocol", requests.protocol.name())?;
     dict.set_item("joined", &requests.joined)?;
     dict.set_item("across_groups", requests.across_groups)?;
     dict.set_item("single_parameters", requests.single_parameters)?;

@@ -81,8 +81,7 @@ def _other_master(frames: list[bytes], seconds: float, bus: Bus) -> Finding:
             f"{len(frames)} whole frames came in {seconds:g} s at {settings} while nothing was asked, of "
             f"{huanyang.NAME}: " + "; ".join(f"{wire} = {words}" for wire, words in shown),
             f"another program speaks to unit {foreign[0][0]} there, in a protocol that has the CRC of Modbus and "
-            "nothing else of it: drivebus has no command for that drive. Units for Modbus need a line of their own, "
-            "or that program stopped and that drive off",
+            "nothing else of it. Units for Modbus need a line of their own, or that program stopped and that drive off",
             values={
                 "seconds": seconds,
                 "settings": settings,

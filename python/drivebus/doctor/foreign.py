@@ -29,8 +29,8 @@ def of_drive(found: Found, settings: Settings) -> Finding:
         OTHER_PROTOCOL,
         Severity.FAULT,
         f"unit {found.unit} answers at {settings} in {huanyang.NAME}, and not in Modbus",
-        "it is a drive of the older HY series, for which drivebus has no command. Units for Modbus need a line "
-        "of their own: what is sent to others may mean something to it",
+        f"it is a drive of the older HY series: name it {huanyang.PROFILE}. Units for Modbus need a line of their own: "
+        "what is sent to others may mean something to it",
         unit=found.unit,
         values={"protocol": found.protocol, "baudrate": settings.baudrate, "format": settings.format},
         error=NoAnswer,

@@ -25,7 +25,7 @@ from drivebus.line.scan_order import PROTOCOLS
 
 __all__ = ["look_for", "look_for_huanyang", "protocol_of", "speaks_otherwise", "time_for", "units"]
 
-_OTHERWISE = f"it speaks {huanyang.NAME}, which is no Modbus: drivebus has no command for it"
+_OTHERWISE = f"it speaks {huanyang.NAME}, which is no Modbus: name it {huanyang.PROFILE}"
 
 _TIMEOUT = 0.1
 """Seconds a unit is given in a scan: over ten times the factory response delay, and 247 units in half a minute."""
@@ -76,7 +76,7 @@ def speaks_otherwise(unit: int, error: NoAnswer | BadAnswer) -> str | None:
 
 
 def _foreign(unit: int, took: float) -> Found:
-    return Found(unit, None, None, took, _OTHERWISE, protocol="huanyang")
+    return Found(unit, None, None, took, _OTHERWISE, candidates=(huanyang.PROFILE,), protocol="huanyang")
 
 
 async def look_for(ask: Ask, now: Callable[[], float], unit: int) -> Found | None:

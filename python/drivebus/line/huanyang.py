@@ -1,7 +1,7 @@
 """Huanyang's own protocol, on the same wires and with the same CRC as Modbus, and none: what its frames mean.
 
 A frame is the unit, a function (01 to 06), how many bytes of data follow, those, and the CRC; request and answer look
-alike. What is one is decided in the core (`crates/drive`). After LinuxCNC,
+alike. What is one is decided in the core (`crates/rtu`). After LinuxCNC,
 src/hal/user_comps/huanyang-vfd/hy_modbus.c (functions, lengths and data):
 
 | function | bytes of data | what |
@@ -22,9 +22,11 @@ from collections.abc import Iterator
 
 from drivebus._native import huanyang_form
 
-__all__ = ["NAME", "REMARK", "STATUS_READ", "belong", "frames_in", "has_form", "is_sure", "tells_status", "words"]
+__all__ = ["NAME", "PROFILE", "REMARK", "STATUS_READ", "belong", "frames_in", "has_form", "is_sure", "tells_status", "words"]
 
 NAME = "Huanyang's own protocol"
+PROFILE = "huanyang-hy"
+"""The profile of drives that speak it."""
 REMARK = f" ({NAME}, no Modbus)"
 """Stands behind the words of a frame."""
 STATUS_READ = bytes((0x04, 0x03, 0x00, 0x00, 0x00))

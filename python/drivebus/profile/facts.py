@@ -58,6 +58,7 @@ class RequestRules(_Fact):
     """What is known of requests beside their length.
 
     Attributes:
+        protocol: `"modbus"`, or `"huanyang"`: that maker's own, of which each register stands for something.
         joined: Where it is printed that one 10H request may write several parameters; None where it is not.
         across_groups: Whether a read may leave its group of parameters.
         single_parameters: Whether a read may have one parameter and no more.
@@ -66,6 +67,7 @@ class RequestRules(_Fact):
         source: The document that says so.
     """
 
+    protocol: str
     joined: str | None
     across_groups: bool
     single_parameters: bool

@@ -120,7 +120,8 @@ proptest! {
             Ok(()) => {
                 let is_own = unit.iter().any(|each| takes(each, place));
                 prop_assert!(!is_own || unit.iter().any(|each| defines(each, place)));
-                let is_foreign = all.iter().any(|each| takes(each, place));
+                let is_foreign =
+                    all.iter().any(|each| each.protocol() == unit[0].protocol() && takes(each, place));
                 let plain = |each: &Arc<Family>| each.profile().stored_address(place).map_or(place, Place::from);
                 let is_known = |each: &Arc<Family>| {
                     [place, plain(each)].into_iter().any(|at| each.profile().entry_at(at).is_some() || takes(each, at))

@@ -124,6 +124,9 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("GOODRIVE 350", "gd350"),
         ("SINAMICS V20", "v20"),
         ("huanyang gt", "chf100a"),
+        ("Huanyang HY", "huanyang-hy"),
+        ("HY02D223B", "huanyang-hy"),
+        ("Dema D5M", "huanyang-hy"),
         ("Fuling DZB200", "chf100a"),
     ] {
         assert_eq!(Profile::builtin(called).unwrap().name(), name, "{called}");

@@ -10,6 +10,7 @@ from typing import Any
 
 import drivebus
 from drivebus import tables
+from drivebus.line import huanyang
 from drivebus.line.write_guard import code_text
 
 __all__ = ["COUNTED", "counted", "in_words", "known", "memory"]
@@ -90,6 +91,8 @@ def _line(profile: drivebus.Profile) -> list[str]:
     words = "1 word" if profile.max_words == 1 else f"{profile.max_words} words"
     requests = profile.requests()
     lines = [f"functions {functions}; {words} in one request at most{_doubt(requests.verified, requests.note)}"]
+    if requests.protocol == "huanyang":
+        lines.append(f"speaks {huanyang.NAME}, and no Modbus")
     if requests.joined:
         lines.append("one request may write several parameters")
     if not requests.across_groups:

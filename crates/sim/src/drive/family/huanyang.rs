@@ -35,7 +35,7 @@ const OVERLOAD: u16 = 1;
 
 pub(crate) fn huanyang() -> Family {
     Family {
-        name: "huanyang".into(),
+        name: "huanyang-hy".into(),
         kind: Kind::Inverter,
         functions: vec![0x01, 0x02, 0x03, 0x04, 0x05],
         max_words: 1,
