@@ -47,6 +47,7 @@ class Program(NamedTuple):
         counts: The words for 2.5 Hz and for 1.5 Hz, in the scale of the family.
         stops: The words by which it may be stopped: of drivebus, and of the program.
         settings: Pins that are set once: the address of the unit.
+        adds: Revolutions a minute that it puts on top of the speed while the motor turns.
     """
 
     family: str
@@ -61,6 +62,7 @@ class Program(NamedTuple):
     stops: tuple[tuple[Place, int], tuple[Place, int]]
     settings: tuple[tuple[str, int], ...] = ()
     counts_hertz: bool = False
+    adds: int = 0
 
 
 RUN, DIRECTION = tables.place("coil", 0x0000), tables.place("coil", 0x0001)
@@ -84,6 +86,13 @@ PROGRAMS = {
         "wj200", "wj200_vfd --device {port} --baud 19200 --parity n --databits 8 --stopbits 1 names=wj200_vfd",
         "wj200_vfd", "commanded-frequency", "run", "enable",
         ((RUN, 1), (DIRECTION, 0)), 0x0001, (250, 150), ((RUN, 0), (RUN, 0)), (("mbslaveaddr", 1),), counts_hertz=True,
+    ),
+    # Huanyang's own protocol: 03 runs forward by 01H and stops by 08H, 05 sets the frequency in 0.01 Hz (Dema D5M manual,
+    # pp. 71 and 72). Its highest frequency is 50 Hz from the factory; the program writes PD144.
+    "hy_vfd": Program(
+        "huanyang-hy", "hy_vfd -n hy_vfd -d {port} -r 19200 -p none -s 1 -t 1 -S 3000", "hy_vfd",
+        "speed-command", "spindle-on", "enable",
+        ((0x0300, 0x01),), 0x0500, (250, 150), ((0x0300, 0x08), (0x0300, 0x08)), (("spindle-forward", 1),), adds=1,
     ),
 }  # fmt: skip
 
@@ -163,7 +172,7 @@ def test_the_same_script_makes_the_motor_do_the_same(
         def set_(pin: str, value: float) -> None:
             known = others[pin]
             if known is not None:
-                session.setp(program.name, known, value)
+                session.setp(program.name, known, value - program.adds if pin == "speed" else value)
 
         # Not each of them ends when it is told to: the session ends it.
         theirs = carried_out(machine, set_, rpm=not program.counts_hertz)
