@@ -458,6 +458,13 @@ impl Doubts {
         self.is_strange(now, unit).then_some(self.strangers_until)
     }
 
+    /// When whatever is doubted of `unit`, which returns no echo, will be over by itself, if anything is.
+    pub(crate) fn ends(&self, now: Instant, unit: UnitAddress) -> Option<Instant> {
+        let asked = self.of(unit).filter(|open| !open.expected.is_echo()).map(|open| open.last + PATIENCE).max();
+        let forgotten = self.forgotten.contains(unit).then_some(self.forgotten_until);
+        [self.first_contact_ends(now, unit), asked, forgotten].into_iter().flatten().max().filter(|&end| now < end)
+    }
+
     fn is_strange(&self, now: Instant, unit: UnitAddress) -> bool {
         self.strangers.contains(unit) && now < self.strangers_until
     }

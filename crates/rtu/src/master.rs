@@ -406,6 +406,11 @@ impl Master {
         self.doubts.may_owe_an_echo(now, unit)
     }
 
+    /// When whatever is doubted of `unit`, which returns no echo, is over by itself; `None` where nothing is.
+    pub(crate) fn doubt_ends(&self, now: Instant, unit: UnitAddress) -> Option<Instant> {
+        self.doubts.ends(now, unit)
+    }
+
     /// When the quarantine of first contact with `unit` ends by itself; `None` where it is over, or was none.
     pub fn first_contact_ends(&self, now: Instant, unit: UnitAddress) -> Option<Instant> {
         self.doubts.first_contact_ends(now, unit)

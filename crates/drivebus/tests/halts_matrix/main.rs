@@ -64,6 +64,11 @@ impl Told<'_> {
     /// Whoever has commands at all says what it is, so that it is halted, if only its name has such a command.
     fn unexpected(self, plant: &Plant, came: &Result<(), Error>) -> Option<String> {
         let is_known = Profile::builtin(self.named).unwrap().command(self.command).is_some();
+        // A name of another protocol halts nothing: the unit hears none of it. That must be told.
+        let speaks = |profile: &Profile| profile.requests().protocol;
+        if speaks(&plant.profile) != speaks(&Profile::builtin(self.named).unwrap()) {
+            return came.is_ok().then(|| "a unit of another protocol was taken for halted".to_owned());
+        }
         match came {
             Ok(()) => (!is_known).then(|| "nobody knows such a command".to_owned()),
             Err(error) if !is_known => {

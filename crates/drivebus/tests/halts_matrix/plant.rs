@@ -89,6 +89,8 @@ impl Plant {
     /// Sets it going in the words of its own family, and waits until it is up to speed.
     pub(crate) fn put(&self, motion: Motion) {
         let (drive, profile, bus) = (self.drive(), &self.profile, self.bus());
+        // It is asked in the protocol that it speaks.
+        bus.drive(1, profile).unwrap();
         if drive.state() != motion.state() {
             if let Some(stop) = profile.command(Command::Stop) {
                 self.write(&bus, stop);
@@ -113,8 +115,8 @@ impl Plant {
 
     /// Some families know no 06H.
     fn write(&self, bus: &Bus, (place, word): (Place, u16)) {
-        let knows_one = self.profile.functions().contains(&0x06);
-        if knows_one { bus.write(1, place, word) } else { bus.write(1, place, [word]) }.unwrap();
+        let needs_many = self.profile.functions().contains(&0x10) && !self.profile.functions().contains(&0x06);
+        if !needs_many { bus.write(1, place, word) } else { bus.write(1, place, [word]) }.unwrap();
     }
 
     pub(crate) fn pass(&self, time: Duration) {

@@ -9,6 +9,7 @@ use super::outcome::{Slip, Unanswered};
 use super::probes::{Probe, Tried};
 use super::two_parts::Begun;
 use super::{Conversation, State, Urgency};
+use crate::huanyang::Huanyang;
 use crate::{Agreement, Attribution, Instant, Request, Table};
 
 /// What one attempt has to remember.
@@ -274,6 +275,7 @@ impl<'r> Conversation<'r> {
     ) {
         let request = match probe {
             Probe::Echo => Request::echo(self.words.next()),
+            Probe::Status { number } => Request::Huanyang(Huanyang::ReadStatus { number }),
             Probe::OtherRead { address, count } => match Request::read(address, count) {
                 Ok(request) => request,
                 // The count was checked when the probe was chosen.

@@ -306,11 +306,22 @@ impl<const UNITS: usize, const PLACES: usize> Known<UNITS, PLACES> {
             _ => in_quarantine,
         };
         if in_doubt {
+            // Its answer says itself what it answers.
+            if let Request::Huanyang(_) = ask.request
+                && self.master.tells_apart(now, unit, &ask.request)
+            {
+                return Next::Ask(Attribution::Certain);
+            }
             let probing = &mut self.units.of(unit).probing;
             if let Some(probe) = probing.probe(&self.master, now, unit, &ask.request, tried, in_time) {
                 return Next::Probe(probe);
             }
-            return self.master.first_contact_ends(now, unit).map_or(Next::GiveUp, Next::Wait);
+            // Of a unit that knows nothing of Modbus only time tells then.
+            let over = match ask.request {
+                Request::Huanyang(_) if in_time => self.master.doubt_ends(now, unit),
+                _ => self.master.first_contact_ends(now, unit),
+            };
+            return over.map_or(Next::GiveUp, Next::Wait);
         }
         self.units.of(unit).probing.is_sure();
         match attribution {

@@ -2,6 +2,7 @@
 
 use super::outcome::Slip;
 use crate::bytes::Bytes;
+use crate::huanyang::Huanyang;
 use crate::{Instant, Master, Request, Table, UnitAddress};
 
 /// How often one attempt echoes a unit that is known to return echoes.
@@ -21,6 +22,11 @@ const BUSY_FOR_GOOD: u32 = 3;
 /// helps with a unit that answers none of them.
 const OTHER_READS: u32 = 2;
 
+/// How many statuses each drive has that speaks Huanyang's protocol.
+///
+/// Source: LinuxCNC, `src/hal/user_comps/huanyang-vfd/hy_vfd.c`.
+const STATUSES: u8 = 8;
+
 /// Most words that a read asks for only to tell its answer from others: what every drive known here allows.
 pub(super) const MAX_WORDS: u16 = 16;
 
@@ -35,6 +41,11 @@ pub(super) enum Probe {
         address: u16,
         /// How many.
         count: u16,
+    },
+    /// In Huanyang's protocol, whose answers repeat it: a status of a number that no open answer has.
+    Status {
+        /// Which one.
+        number: u8,
     },
 }
 
@@ -61,7 +72,7 @@ impl Tried {
     pub(super) fn note(&mut self, probe: Probe) {
         match probe {
             Probe::Echo => self.echoes += 1,
-            Probe::OtherRead { .. } => self.other_read = true,
+            Probe::OtherRead { .. } | Probe::Status { .. } => self.other_read = true,
         }
     }
 }
@@ -132,7 +143,11 @@ impl Probing {
         in_time: bool,
     ) -> Option<Probe> {
         if let Request::Huanyang(_) = request {
-            return None; // it knows no echo, and nothing else of Modbus
+            // It knows no echo, and nothing else of Modbus.
+            let status = |number| Request::Huanyang(Huanyang::ReadStatus { number });
+            let apart = |&number: &u8| master.tells_apart(now, unit, &status(number));
+            let number = (0..STATUSES).find(apart).filter(|_| !tried.other_read)?;
+            return Some(Probe::Status { number });
         }
         let known = self;
         let again = match known.echo {
@@ -166,7 +181,7 @@ impl Probing {
         };
         match probe {
             Some(Probe::Echo) => known.echo_was_last = true,
-            Some(Probe::OtherRead { .. }) => {
+            Some(Probe::OtherRead { .. } | Probe::Status { .. }) => {
                 known.echo_was_last = false;
                 known.other_reads += 1;
             }
