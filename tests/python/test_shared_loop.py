@@ -27,7 +27,7 @@ IDENTIFICATION, GD350 = 0x2103, 0x01A0
 PATIENCE = 20.0  # seconds for which the other program is held; only a test that fails sees their end
 # Who waits for that program waits a second each time: so many of them outlast it.
 TIMES = 40
-HELLO = b"drivebus share \x08\x04test\x80\x96\x01\x08N\x01\x00"  # at 19200 8N1
+HELLO = b"drivebus share \x09\x04test\x80\x96\x01\x08N\x01\x00"  # at 19200 8N1
 WATCH, RECONNECTS = b"\x06", b"\x08"
 
 

@@ -54,7 +54,7 @@ fn who_says_what_is_no_proof_is_cut_off_and_the_line_goes_on() {
     on_loopback("outsiders::who_says_what_is_no_proof_is_cut_off_and_the_line_goes_on", |folder| {
         let (owner, guest) = (open(), open());
         let opening = [OPENING, &[7; 32]].concat();
-        let hello = [b"drivebus share ", &[8, 4, b't', b'e', b's', b't'][..]].concat();
+        let hello = [b"drivebus share ", &[9, 4, b't', b'e', b's', b't'][..]].concat();
         let words: [&[u8]; 7] = [
             b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
             &[0; 64],
