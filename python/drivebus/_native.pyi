@@ -376,7 +376,7 @@ class Bus:
     def configure(self, unit: int, /, *, timeout: float | None = None, gap: float | None = None) -> None:
         """What *unit* needs otherwise than the bus, in seconds; None keeps what the bus has."""
     def set_profile(self, unit: int, profile: Profile, /) -> None:
-        """*unit* speaks the protocol of *profile*, and its exceptions mean what that says; until then both as in Modbus."""
+        """*unit* speaks the protocol of *profile*, and its exceptions mean what that says; until then as in Modbus."""
     def halts(self, unit: int, /) -> int:
         """A number that is another one each time *unit* is told to halt; see `Requests.halts`."""
 

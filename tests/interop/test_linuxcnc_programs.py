@@ -87,8 +87,8 @@ PROGRAMS = {
         "wj200_vfd", "commanded-frequency", "run", "enable",
         ((RUN, 1), (DIRECTION, 0)), 0x0001, (250, 150), ((RUN, 0), (RUN, 0)), (("mbslaveaddr", 1),), counts_hertz=True,
     ),
-    # Huanyang's own protocol: 03 runs forward by 01H and stops by 08H, 05 sets the frequency in 0.01 Hz (Dema D5M manual,
-    # pp. 71 and 72). Its highest frequency is 50 Hz from the factory; the program writes PD144.
+    # Huanyang's own protocol: 03 runs forward by 01H and stops by 08H, 05 sets the frequency in 0.01 Hz (Dema D5M
+    # manual, pp. 71 and 72). Its highest frequency is 50 Hz from the factory; the program writes PD144.
     "hy_vfd": Program(
         "huanyang-hy", "hy_vfd -n hy_vfd -d {port} -r 19200 -p none -s 1 -t 1 -S 3000", "hy_vfd",
         "speed-command", "spindle-on", "enable",

@@ -381,7 +381,7 @@ print(guest.recv(200))
 
     def test_one_of_another_version_is_told_so(self, line: Simulator, folder: Path) -> None:
         with open_bus(line), self.knock(folder) as guest:
-            self.say(guest, b"drivebus share \x0A whatever that says")
+            self.say(guest, b"drivebus share \x0a whatever that says")
             answer = self.hear(guest)
             assert answer[0] == 1
             assert b"speaks version 8 where this program speaks 9" in answer

@@ -55,7 +55,7 @@ impl Plant {
     /// Some families know no 06H.
     fn write(&self, place: Place, word: u16) -> Result<(), Error> {
         let needs_many = self.profile.functions().contains(&0x10) && !self.profile.functions().contains(&0x06);
-        if !needs_many { self.bus.write(1, place, word) } else { self.bus.write(1, place, [word]) }
+        if needs_many { self.bus.write(1, place, [word]) } else { self.bus.write(1, place, word) }
     }
 
     fn simulated(&self) -> SimulatedDrive {

@@ -15,15 +15,18 @@ use drivebus::{Bus, Drive, ErrorKind, Profile};
 /// Words that stay as they are, and what they are from the factory of the simulated drive.
 const CONSTANT: [(u16, u16); 5] = [(0x0105, 5_000), (0x0190, 1_440), (0x018E, 70), (0x018F, 4), (0x01A3, 1)];
 
+/// The frames that went out.
+type Sent = Arc<Mutex<Vec<Vec<u8>>>>;
+
 /// A drive that obeys the bus, and all that was sent to it.
-fn plant() -> (Simulator, Bus, Drive, Arc<Mutex<Vec<Vec<u8>>>>) {
+fn plant() -> (Simulator, Bus, Drive, Sent) {
     let simulator = Simulator::new([(1, "huanyang-hy")], Options::default().seed(7)).unwrap();
     for (address, word) in [(0x0101, 2), (0x0102, 2)] {
         simulator.drive(1).unwrap().set_parameter(address, word).unwrap();
     }
     let line = simulator.clone();
     let bus = Bus::builder().open_with(Box::new(move || Ok(Box::new(line.open_line()?)))).unwrap();
-    let sent = Arc::new(Mutex::new(Vec::new()));
+    let sent = Sent::default();
     let kept = Arc::clone(&sent);
     bus.watch(Some(Arc::new(move |traced: Traced| {
         if traced.direction == Direction::Sent {

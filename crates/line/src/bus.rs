@@ -191,12 +191,10 @@ impl Bus {
         let mut give_up = || self.is_shut() || give_up();
         let options = spoken::options_for(&said, options);
         let take = &mut |answer: Answer<'_>| spoken::tell(&said, request, answer, take);
+        let ask = self.port().ask(destination, &said, &options);
         let result = match &self.shared.sharing {
             Some(_) => self.shared.call_shared(destination, &said, options, &mut give_up, take),
-            None => {
-                let ask = self.port().ask(destination, &said, &options);
-                Call::new(self.port(), ask, options).run(&mut give_up, take)
-            }
+            None => Call::new(self.port(), ask, options).run(&mut give_up, take),
         };
         if self.is_shut() {
             self.close();

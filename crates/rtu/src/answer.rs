@@ -2,6 +2,7 @@
 
 pub(crate) mod error;
 mod head;
+mod huanyang;
 mod seldom;
 
 use crate::identification::IdentificationPage;

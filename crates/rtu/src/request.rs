@@ -2,6 +2,7 @@
 //!
 //! Source: *Modbus Application Protocol* V1.1b3, §6.1 to §6.6, §6.8, §6.11 to §6.13, §6.16, §6.17, §6.21.
 
+mod huanyang;
 mod seldom;
 
 use core::fmt;

@@ -22,7 +22,18 @@ from collections.abc import Iterator
 
 from drivebus._native import huanyang_form
 
-__all__ = ["NAME", "PROFILE", "REMARK", "STATUS_READ", "belong", "frames_in", "has_form", "is_sure", "tells_status", "words"]
+__all__ = [
+    "NAME",
+    "PROFILE",
+    "REMARK",
+    "STATUS_READ",
+    "belong",
+    "frames_in",
+    "has_form",
+    "is_sure",
+    "tells_status",
+    "words",
+]
 
 NAME = "Huanyang's own protocol"
 PROFILE = "huanyang-hy"

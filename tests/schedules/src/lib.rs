@@ -105,6 +105,7 @@ mod bus {
     // Between the bus and its door: programs come in to the port of one that shares with nobody else.
     #[path = "no_sharing.rs"]
     mod sharing;
+    pub(crate) mod spoken;
     #[path = "unshared.rs"]
     mod through;
     pub(crate) mod workers;

@@ -116,7 +116,7 @@ impl Plant {
     /// Some families know no 06H.
     fn write(&self, bus: &Bus, (place, word): (Place, u16)) {
         let needs_many = self.profile.functions().contains(&0x10) && !self.profile.functions().contains(&0x06);
-        if !needs_many { bus.write(1, place, word) } else { bus.write(1, place, [word]) }.unwrap();
+        if needs_many { bus.write(1, place, [word]) } else { bus.write(1, place, word) }.unwrap();
     }
 
     pub(crate) fn pass(&self, time: Duration) {

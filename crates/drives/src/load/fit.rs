@@ -118,10 +118,10 @@ fn protocol(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut 
         let Some(Place { table, address }) = entry.place() else { continue };
         let fits = table == Table::Holding
             && entry.words() == 1
-            && match (address.to_be_bytes(), entry.access) {
-                ([0x01, _], _) | ([0x04, _], Access::Ro) | ([0x03 | 0x05, 0], Access::Wo) => true,
-                _ => false,
-            };
+            && matches!(
+                (address.to_be_bytes(), entry.access),
+                ([0x01, _], _) | ([0x04, _], Access::Ro) | ([0x03 | 0x05, 0], Access::Wo)
+            );
         if !fits {
             let has = "parameters at 0100H to 01FFH, read-only words at 0400H to 04FFH, and write-only ones at 0300H and 0500H";
             problems.add(file, place, format!("Huanyang's protocol has {has}: {} is none of those", entry.name));

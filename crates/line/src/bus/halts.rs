@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use drivebus_rtu::huanyang::request_of;
 use drivebus_rtu::{Answer, Destination, Instant, Request, UnitAddress};
 
 use crate::bus::call::Call;
@@ -95,7 +94,7 @@ fn is_another(port: &Port, unit: UnitAddress, (question, others): &(Vec<u8>, Vec
 /// Halts the unit in one of the ways of `will`.
 fn halt(port: &Port, unit: UnitAddress, will: &Will, way: usize) -> Result<(), Failure> {
     for pdu in will.ways.get(way).into_iter().flatten() {
-        let Some(request) = request_of(pdu) else { continue };
+        let Some(request) = Request::of_either(pdu) else { continue };
         let options = CallOptions::new().urgent(&request).timeout(Duration::from_nanos(will.timeout)).retries(0);
         let options = CallOptions { priority: Some(Priority::Stop), ..options };
         let ask = port.ask(unit.into(), &request, &options);

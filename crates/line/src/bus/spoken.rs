@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use drivebus_rtu::huanyang::{Huanyang, Protocol, request_of};
+use drivebus_rtu::huanyang::{Huanyang, Protocol};
 use drivebus_rtu::{Adu, Answer, Destination, Frame, Request, UnitAddress};
 
 use crate::error::Failure;
@@ -67,7 +67,7 @@ impl Spoken {
             return will;
         }
         let said = |pdu: &Vec<u8>| {
-            let asked = Huanyang::of(&request_of(pdu)?)?;
+            let asked = Huanyang::of(&Request::of_either(pdu)?)?;
             let frame = Adu::request(will.unit.into(), &Request::Huanyang(asked));
             Some(Frame::parse(frame.as_bytes()).ok()?.pdu().to_vec())
         };

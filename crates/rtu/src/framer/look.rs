@@ -136,7 +136,7 @@ impl Framer {
     /// Length that the answer looked for has by its own account.
     fn answer_lengths(&self, here: &[u8]) -> [Option<usize>; 2] {
         if self.is_counted() {
-            return self.counted_lengths(here);
+            return Self::counted_lengths(here);
         }
         let len = match *here {
             [_, READ_COILS..=READ_INPUT, bytes, ..] => EXCEPTION_ADU + usize::from(bytes),
@@ -151,7 +151,7 @@ impl Framer {
     /// Lengths that an answer has which says so right behind the function, as in Huanyang's protocol. A refusal may be as short as
     /// one of Modbus.
     #[cold]
-    fn counted_lengths(&self, here: &[u8]) -> [Option<usize>; 2] {
+    fn counted_lengths(here: &[u8]) -> [Option<usize>; 2] {
         match *here {
             [_] | [_, _] => [Some(here.len() + 1), None],
             [_, function, count, ..] => {

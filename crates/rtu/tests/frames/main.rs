@@ -7,6 +7,7 @@ mod common;
 mod crc;
 mod extreme_moments;
 mod framer;
+mod huanyang;
 mod lumps;
 mod master;
 mod pdu;

@@ -73,14 +73,12 @@ impl Drive {
         };
         let request = request.map_or(Request::read(address, 1).ok()?, |value| Request::write(address, value));
         let (mut words, mut answer) = ([0; MOST_WORDS], [0; MAX_PDU]);
-        let told = self.carry_out(now, &request, &mut words).map(|_| ());
-        let len = match told {
-            Ok(()) => asked.answer(words[0], self.fits_a_byte(address), self.told_state(), &mut answer),
-            Err(_) => {
-                let refusal = asked.refusal();
-                answer[..refusal.len()].copy_from_slice(&refusal);
-                refusal.len()
-            }
+        let len = if self.carry_out(now, &request, &mut words).is_ok() {
+            asked.answer(words[0], self.fits_a_byte(address), self.told_state(), &mut answer)
+        } else {
+            let refusal = asked.refusal();
+            answer[..refusal.len()].copy_from_slice(&refusal);
+            refusal.len()
         };
         Some(Adu::answer(self.unit, &Answer::custom(&answer[..len]).ok()?))
     }
