@@ -60,7 +60,11 @@ def unsettle(drive: Drive) -> dict[str, int]:
             try:
                 profile.encode(name, profile.decode(name, word))
                 # A J1000 knows no 06H.
-                drive.bus.write(drive.unit, profile.address(name, store=True), word if 0x06 in functions else [word])
+                drive.bus.write(
+                    drive.unit,
+                    profile.address(name, store=True),
+                    [word] if 0x10 in functions and 0x06 not in functions else word,
+                )
             except (NotAllowed, Refused):
                 continue
             changed[code] = word

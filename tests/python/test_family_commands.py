@@ -60,6 +60,10 @@ def drive_of(bus: Bus, family: str, *, unverified: bool) -> Drive:
 def prepare(drive: Drive) -> None:
     """Where no write is known that RAM alone keeps, it is kept in EEPROM."""
     drive.prepare_control(store=drive.profile.memory() is None)
+    if drive.profile.state(1) == "running":
+        # Its state is its frequency: told to run at 0 Hz it shows nothing.
+        drive.prepare_control(setpoint="frequency", store=True)
+        drive.setpoint = 10.0
 
 
 def from_rest(family: dict[str, Any], command: str) -> list[tuple[int | None, int | None]]:
@@ -76,6 +80,9 @@ def commanded(simulator: Simulator) -> list[tuple[int, int]]:
     registers = REGISTERS - {row.address for row in rows if row.kind == "parameter"}
     found = []
     for _, sender, frame in simulator.line.trace():
+        if sender == "master" and profile.requests().protocol == "huanyang":
+            found += [(0x0300, frame[3])] if frame[1] == 0x03 else []
+            continue
         if sender == "master" and frame[1] == 0x05:
             found.append(
                 (0x1_0000 + int.from_bytes(frame[2:4], "big"), {0xFF00: 1, 0: 0}[int.from_bytes(frame[4:6], "big")])

@@ -167,4 +167,4 @@ def test_others_that_have_words_at_its_addresses_are_not_taken_for_it(family: st
 @pytest.mark.parametrize("name", ["H100", "StepperOnline V70", "stepperonline-v70", "Vevor D100"])
 def test_it_goes_by_what_stands_on_it(name: str) -> None:
     assert Profile.find(name) is Profile.builtin("h100")
-    assert drivebus.profiles()[-1] == "h100"
+    assert "h100" in drivebus.profiles()

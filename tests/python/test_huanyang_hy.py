@@ -98,6 +98,29 @@ def test_what_it_measures(simulator: Simulator, drive: Drive) -> None:
     assert {pdu[:5] for pdu in asked(simulator)} >= {"04 01"}
 
 
+def test_every_row_is_answered_or_refused_as_it_says(bus: Bus, drive: Drive) -> None:
+    profile = Profile.builtin("huanyang-hy")
+    for name in profile.names():
+        row = profile.describe(name)
+        assert row.address is not None
+        if row.access != "wo":
+            assert len(drive.read_words(row.address)) == 1, name
+        if row.access == "ro":
+            with pytest.raises(NotAllowed):
+                bus.write(1, row.address, 1)
+
+
+@pytest.mark.parametrize("hertz", [0.0, 0.01, 49.99, 50.0])
+def test_the_setpoint_ends_at_pd005(simulator: Simulator, drive: Drive, hertz: float) -> None:
+    drive.setpoint = hertz
+    assert written(simulator)[-1] == "05 02 " + round(hertz * 100).to_bytes(2, "big").hex(" ").upper()
+    before = written(simulator)
+    for beyond in (50.01, -0.01, 0.005):
+        with pytest.raises(NotAllowed):
+            drive.setpoint = beyond
+    assert written(simulator) == before
+
+
 @pytest.mark.parametrize(
     ("name", "value", "pdu"),
     [("PD014", 5.0, "02 03 0E 00 32"), ("PD005", 400.0, "02 03 05 9C 40"), ("PD143", 2, "02 03 8F 00 02")],

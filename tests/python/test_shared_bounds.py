@@ -179,7 +179,7 @@ def test_a_server_is_one_under_all_its_names(server: OwnMotor) -> None:
     assert max(event["clients"] for event in server.events if "clients" in event) == 1
 
 
-GREETING = b"drivebus share \x08\x04test\x80\x96\x01\x08N\x01\x00"
+GREETING = b"drivebus share \x09\x04test\x80\x96\x01\x08N\x01\x00"
 """postcard: a string with its length, 19200 in sevens of bits, three bytes, and that it is for no stop."""
 
 

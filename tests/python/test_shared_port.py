@@ -384,7 +384,7 @@ print(guest.recv(200))
             self.say(guest, b"drivebus share \x0a whatever that says")
             answer = self.hear(guest)
             assert answer[0] == 1
-            assert b"speaks version 8 where this program speaks 9" in answer
+            assert b"speaks version 9 where this program speaks 10" in answer
             assert self.hear(guest) == b""
 
     @pytest.mark.parametrize(

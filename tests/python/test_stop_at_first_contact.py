@@ -31,6 +31,8 @@ QUESTIONS = {
     # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there.
     "acs355": (10, 172),
     "acs580": (9, 155),
+    # Nothing is asked: what halts it says nothing to a drive of Modbus. The line is silent for 50 ms before.
+    "huanyang-hy": (0, 55),
 }
 """Requests before the first frame that halts, and milliseconds of the line's time until it goes out, at most."""
 
@@ -43,7 +45,12 @@ def test_a_stop_of_a_family_on_a_line_just_opened(family: str) -> None:
     profile = Profile.builtin(family)
     halts = {profile.command("stop"), profile.command_first("stop")}
     places = {place & 0xFFFF for place, _ in filter(None, halts)}
-    is_halt = [frame[1] in (5, 6, 16) and int.from_bytes(frame[2:4], "big") in places for _, frame in sent]
+    is_halt = [
+        frame[1] in (5, 6, 16) and int.from_bytes(frame[2:4], "big") in places
+        if profile.requests().protocol == "modbus"
+        else frame[1:4] == bytes((3, 1, 8))
+        for _, frame in sent
+    ]
     before = is_halt.index(True)
     requests, milliseconds = QUESTIONS[family]
     assert before <= requests

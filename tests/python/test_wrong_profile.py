@@ -205,7 +205,8 @@ def refuse(simulator: Simulator, exception: int) -> None:
 
 
 def test_the_table_has_every_family() -> None:
-    assert set(TAKEN_FOR) == set(drivebus.profiles())
+    # A Huanyang HY hears nothing of Modbus, and others nothing of its protocol: see `test_huanyang_hy`.
+    assert set(TAKEN_FOR) == set(drivebus.profiles()) - {"huanyang-hy"}
     assert {unit for named in TAKEN_FOR for unit in sampled(named) if unit != named} == set(TAKEN_FOR)
 
 

@@ -22,6 +22,7 @@ from drivebus.cli.present.found_units import FoundUnit
 from drivebus.cli.present.output import counted, remark
 from drivebus.cli.session import Session, pass_session
 from drivebus.cli.wrong_use import WrongUse
+from drivebus.line import huanyang
 from drivebus.line.scan_order import PROTOCOLS, asked
 
 __all__ = ["COMMANDS"]
@@ -136,7 +137,7 @@ def _units_to_ask(context: click.Context, session: Session, units: str) -> tuple
 def info(session: Session) -> None:
     """Show which drive it is and how sure that is, what is known about its family, and whether it obeys the bus."""
     with session.bus() as bus:
-        found = bus.identify(session.unit)
+        found = _identified(session, bus)
         identity = Identity(found, bus.port, f"{session.baud} {''.join(session.line_format)}")
         try:
             drive = session.drive_on(bus)
@@ -154,6 +155,15 @@ def info(session: Session) -> None:
         remark(f"Using profile {known.profile.name}; the drive does not report its family.")
 
 
+def _identified(session: Session, bus: drivebus.Bus) -> drivebus.Identification:
+    """What the unit says that it is; one that is named as a drive of another protocol is asked nothing of Modbus."""
+    named = None if session.profile is None else drivebus.Profile.find(session.profile)
+    if named is None or named.requests().protocol == "modbus":
+        return bus.identify(session.unit)
+    reason = f"it is named as a drive that speaks {huanyang.NAME}, in which none says what it is"
+    return drivebus.Identification(session.unit, (named.name,), named.name, None, named.title, "unknown", reason)
+
+
 def _device(bus: drivebus.Bus, found: drivebus.Identification) -> drivebus.DeviceIdentification | None:
     """Who made a unit of which nothing else is known, if it says so; no other is asked."""
     if found.candidates:
@@ -168,7 +178,7 @@ def _round_trip(bus: drivebus.Bus, unit: int) -> float | None:
     """Seconds that an echo takes there and back; None if the unit takes no echo."""
     try:
         return bus.echo(unit)
-    except drivebus.Refused:
+    except (drivebus.Refused, drivebus.NotAllowed):
         return None
 
 

@@ -8,7 +8,7 @@
 //! - Assumption: F0-02 = 2 obeys the bus; F0-03 = 9 takes the frequency from it, and else it is F0-08. All are 0 from the factory, but
 //!   F0-10, 50.00 Hz, and F0-22, two decimals.
 //! - Assumption: F0-17 and F0-18 are the ramps, in tenths of a second from 0 to F0-10. 8, by which sisters end a jog, is out of range.
-//! - Assumption: twelve words in a read, none of the next group. 03H for a word out of range, 02H for what can only be read or only be
+//! - Assumption: one word in a read. 03H for a word out of range, 02H for what can only be read or only be
 //!   written, 04H for what is not done now.
 //! - Assumption: in fault 3000H is 3. An overload trips 11, a bus that is silent for longer than FD-04 trips 16.
 
@@ -37,7 +37,7 @@ pub(crate) fn md500() -> Family {
         name: "md500".into(),
         kind: Kind::Inverter,
         functions: vec![0x03, 0x06],
-        max_words: 12,
+        max_words: 1,
         across_groups: false,
         exception: by_the_specification,
         memory: Memory::BitsMeanEeprom(0xF000),
