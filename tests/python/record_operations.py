@@ -14,14 +14,14 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack
 from typing import Any
 
-from drivebus import Profile, profiles
+from drivebus import Profile
 from drivebus.line.blocking import BlockingBus
 from drivebus.operations.events import LOGGER
 
 from .recorded_bus import Noting
 from .recorded_calls import Case, cases_of
 from .recorded_operations import FOLDER, Talk
-from .recorded_scenes import COMMON, MISHAPS, NO_REQUEST, Counts, stage_of
+from .recorded_scenes import COMMON, MISHAPS, NO_REQUEST, NOTED, Counts, stage_of
 
 __all__ = ["record"]
 
@@ -89,7 +89,7 @@ def turn_of(family: str) -> tuple[int, tuple[int, int]]:
     """Which family of its kind it is, and how often one of that kind has a pair."""
     groups: dict[bool, list[str]] = {True: [], False: []}
     words: list[dict[str, tuple[int, int]]] = [{}]
-    for name in profiles():
+    for name in NOTED:
         profile = Profile.builtin(name)
         told = {command: profile.command(command) for command in profile.commands()}
         groups[told not in words].append(name)
@@ -148,7 +148,7 @@ def main(families: list[str]) -> None:
     """Records *families*, or all of them where none is named."""
     FOLDER.mkdir(exist_ok=True)
     with ProcessPoolExecutor(AT_ONCE, initializer=quiet) as workers:
-        for _done in workers.map(write, families or profiles()):
+        for _done in workers.map(write, families or NOTED):
             pass
 
 

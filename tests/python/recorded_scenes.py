@@ -41,10 +41,13 @@ class Counts(NamedTuple):
 
 NO_REQUEST = Counts(0, None, None)
 
+NOTED = [name for name in profiles() if Profile.builtin(name).requests().protocol == "modbus"]
+"""What is noted is what they are asked in Modbus."""
+
 
 def others_of(family: str) -> list[str]:
     """Two families whose drives are halted by other words than those of *family*, and than each other's."""
-    names = profiles()
+    names = NOTED
     begin = names.index(family)
     found: list[str] = []
     halts = [_halts(family)]

@@ -154,6 +154,8 @@ def test_what_is_written_names_the_documents_of_each_family(family: str) -> None
 
 def says_what_it_is(family: str) -> str:
     """What a simulated drive of the family is taken for by what it answers."""
+    if drivebus.Profile.builtin(family).requests().protocol != "modbus":
+        return "no, but it speaks another protocol"
     with drivebus.Bus(f"sim://{family}?clock=virtual") as bus:
         certainty = bus.identify(1).certainty
     return {"certain": "yes", "shared": "yes, a shared code", "by answers": "by its answers", "unknown": "no"}[

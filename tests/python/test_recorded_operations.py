@@ -11,18 +11,18 @@ from typing import Any
 
 import pytest
 
-from drivebus import Profile, profiles
+from drivebus import Profile
 
 from .record_operations import record
 from .recorded_calls import cases_of
 from .recorded_operations import FOLDER, conversations, replay
-from .recorded_scenes import MISHAPS
+from .recorded_scenes import MISHAPS, NOTED
 
 AT_LEAST = 2000
 MOST_BYTES = 5_000_000
 
 
-@pytest.mark.parametrize("family", profiles())
+@pytest.mark.parametrize("family", NOTED)
 def test_operations_ask_and_end_as_they_did(family: str) -> None:
     for number, conversation in enumerate(conversations(family), 1):
         try:
@@ -86,7 +86,7 @@ def test_so_is_another_end() -> None:
 
 
 def test_every_family_case_and_mishap_is_there() -> None:
-    every = {family: list(conversations(family)) for family in profiles()}
+    every = {family: list(conversations(family)) for family in NOTED}
     assert sum(map(len, every.values())) >= AT_LEAST
     for family, noted in every.items():
         assert {each["family"] for each in noted} == {family}
@@ -94,7 +94,7 @@ def test_every_family_case_and_mishap_is_there() -> None:
     together = Counter(each["mishap"] for noted in every.values() for each in noted)
     assert set(together) == set(MISHAPS)
     assert min(together.values()) >= 20
-    assert {each.name.removesuffix(".jsonl") for each in FOLDER.iterdir()} == set(profiles())
+    assert {each.name.removesuffix(".jsonl") for each in FOLDER.iterdir()} == set(NOTED)
     assert sum(each.stat().st_size for each in FOLDER.iterdir()) < MOST_BYTES
 
 

@@ -7,7 +7,7 @@
 //! - Assumption: bits 15 and 14 together put commands and frequency on the bus, and words without both are out of range here, as are
 //!   the emergency stop and whatever is no word below.
 //! - Assumption: bit 10 of FD01H is on until the motor stands; bit 1 and bit 0 are on with a trip. FC91H is 0.
-//! - Assumption: FE03H is hundredths of a percent of the rated current, which is 0 at rest; FE05H is 0.
+//! - Assumption: FD03H is hundredths of a percent of the rated current, which is 0 at rest; FD05H is 0.
 //! - Assumption: it answers FA00H and FA01H with what was written. UL (0012H) is 50.00 Hz.
 //! - Ramps have no parameters in the pages at hand; the times are fixed. An overload does not trip, for its number is not at hand, nor
 //!   does a silent bus.
@@ -60,8 +60,8 @@ const REGISTERS: &[Register] = &[
     Register::read(0xFC91, Shows::Zero),
     Register::read(0xFD00, Shows::Measured(Measure::Frequency, 100.0)),
     Register::read(0xFD01, Shows::bits(STATUS)),
-    Register::read(0xFE03, Shows::Measured(Measure::Current, 100.0)),
-    Register::read(0xFE05, Shows::Zero),
+    Register::read(0xFD03, Shows::Measured(Measure::Current, 100.0)),
+    Register::read(0xFD05, Shows::Zero),
 ];
 
 const STATUS: &[Bit] = &[Bit::Fault(0), Bit::Fault(1), Bit::Reverse(9), Bit::Running(10)];
