@@ -56,6 +56,7 @@ def test_it_stops_coasts_and_resets(line: Simulator, drive: Drive) -> None:
     # DOTD may make a ramp of it.
     with pytest.raises(NotAllowed, match="coast of Schneider Altivar 600 is not verified"):
         drive.coast()
+    assert isinstance(drive.bus, Bus)
     drive.bus.drive(1, "atv600", unverified=True).coast()
     line.advance(60.0)
     line.drive(1).trip(17)
