@@ -669,8 +669,9 @@ class Task:
             `"read"` or `"stamped"` and the arguments of a `drivebus.line.asking.Read`; `"write"` and those of a
             `drivebus.line.asking.Write`; `"sleep"` and seconds of the line's clock; `"link"` or `"halts"` and a unit;
             the notice `"took"` and a command that the unit took, `"saw"` and what `Looks.look` comes to, `"shows"` and
-            a state, `"stored"`, a code and how often that was written, or `"starts"` and a command that is about to be
-            sent; or `"done"` and the result.
+            a state, `"took_other"`, a command, the word that the unit took for it, and what is told of
+            `"set_otherwise"` in `Halt.carry_out`, `"stored"`, a code and how often that was written, or `"starts"` and a
+            command that is about to be sent; or `"done"` and the result.
 
         Raises:
             DrivebusError: It failed; an error of the line that it does not handle comes back as it was given.
@@ -736,8 +737,8 @@ class Unit:
     `"not_set"`: `"no_register"`, `"may_not"`; `"not_settled"` as below; `"not_in_hz"` and the unit; `"above"`, a
     parameter and its value; `"not_written"`. `"not_settled"`: `"unproved"` or `"unreadable"` and the variant;
     `"unknown"`, the variant and the raw number. `"not_written"`: `"not_same"` and a result of `SameUnit.check`;
-    `"harm"`, and `"may_be"` and the families that it may be, which may be none, `"busy"` as of `identify`, or
-    `"failed"` and the error of the line; `"failed"` and the error.
+    `"harm"`, and `"may_be"` and the families that it may be, which may be none, `"set_otherwise"` as of `Halt`, `"busy"`
+    as of `identify`, or `"failed"` and the error of the line; `"failed"` and the error.
 
     `"not_reached"`: `"unseen"`; `"untold"` and the role; `"tripped"`, whether the first look showed that, and a status;
     `"late"` and a status.
@@ -909,7 +910,9 @@ class Halt:
         """Halts it. The result is `"done"` and nothing, or `"not_halted"` and why.
 
         That is the family that it is taken for, the command sent last, when that was found, and the kind of the reason
-        with what is told: `"may_not"`; `"undecided"`, the command that was wanted, and families; `"unsaid"`;
+        with what is told: `"may_not"`; `"undecided"`, the command that was wanted, and families; `"set_otherwise"`, the
+        command that was wanted, and what its words depend on (the parameter, what it holds, what it must hold, what
+        that is called, what the words mean as it is, or an empty text, and a note); `"unsaid"`;
         `"not_sent"` and the error; `"refused"` or `"unanswered"`, the error, how often it was sent (the commands, in
         how many seconds, and how many seconds ago the unit was heard or None), and a look as of `Looks.look` or the
         error instead of one; `"unasked"` and the error; `"another"`, what speaks against its name or None, and a kind

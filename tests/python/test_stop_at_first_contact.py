@@ -25,7 +25,10 @@ QUESTIONS = {
     "fr-d700": (5, 92),
     # An MD500 has its setpoint where these take their commands, and is asked for 7000H.
     **dict.fromkeys(("chf100a", "saj8000m"), (7, 120)),
-    **dict.fromkeys(("atv312", "atv12", "atv600", "a1000"), (6, 105)),
+    "a1000": (6, 105),
+    # An Altivar 600 is asked for CHCF, too: in its I/O profile 07H runs it. By the other two names nobody would ask it,
+    # so one more word tells that they are none.
+    **dict.fromkeys(("atv312", "atv12", "atv600"), (7, 120)),
     "j1000": (7, 125),
     "v20": (8, 140),
     # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there.

@@ -8,7 +8,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use drivebus_drives::Command;
+use drivebus_drives::{Command, Place};
 use drivebus_rtu::Instant;
 use thiserror::Error;
 
@@ -19,6 +19,7 @@ use crate::family::Family;
 use crate::harm::What;
 use crate::huanyang::may_be_of;
 use crate::same_unit::SameUnit;
+use crate::set_otherwise::{Dialect, SetOtherwise, dialect};
 use crate::task::{LineError, Mailbox, Read};
 
 /// For so long a unit is given to answer what is asked before a halt, and the halt itself.
@@ -26,6 +27,9 @@ pub const ANSWER_WITHIN: Duration = Duration::from_millis(100);
 
 /// Most questions about one unit; the longest way through the shipped families takes 15.
 const QUESTIONS: usize = 24;
+
+/// How often a unit that this line has identified is asked once more which words it takes.
+const AGAIN: u32 = 2;
 
 /// What is sent to halt a unit.
 #[derive(Debug, Clone)]
@@ -35,6 +39,25 @@ pub struct Target {
     pub family: Arc<Family>,
     /// The command of that family.
     pub command: Command,
+    /// What gives the words of that family another meaning; then it is the word of that which is sent.
+    pub otherwise: Option<Box<SetOtherwise>>,
+}
+
+impl Target {
+    fn of(family: &Arc<Family>, command: Command) -> Self {
+        Self { family: Arc::clone(family), command, otherwise: None }
+    }
+
+    /// What is written, and where: first the word that comes before a command of some families.
+    pub fn words(&self) -> impl Iterator<Item = (Place, u16)> {
+        let profile = self.family.profile();
+        let (first, own) = (profile.command_first(self.command), profile.command(self.command));
+        let (first, word) = match &self.otherwise {
+            None => (first, own),
+            Some(otherwise) => (None, own.and_then(|(place, _)| Some((place, otherwise.halt(self.command)?)))),
+        };
+        first.into_iter().chain(word)
+    }
 }
 
 /// Why a unit is not halted by what was meant, or nothing is written to it. `E` is the error of whoever drives.
@@ -47,6 +70,9 @@ pub enum NotTaken<E> {
     /// It may be any of these, which what was meant may start or change; where there are none, it fits no family.
     #[error("by what the unit answers it may be {}", titles(.0))]
     MayBe(Vec<Arc<Family>>),
+    /// It is set to take other words, and what was meant is none of those that are known to halt then.
+    #[error("the command words of the unit mean something else: {0}")]
+    SetOtherwise(Box<SetOtherwise>),
 }
 
 fn titles(families: &[Arc<Family>]) -> String {
@@ -70,6 +96,10 @@ struct Look {
     heard: Instant,
     /// How often the port had been opened again when it was asked last.
     connection: u64,
+    /// A family other than the named one whose words it takes, as it said over this connection.
+    own_words: Option<Arc<Family>>,
+    /// How often it was silent when it was asked for that.
+    lost: u32,
 }
 
 impl Aim {
@@ -77,7 +107,18 @@ impl Aim {
     pub fn new(same: SameUnit, families: &Families, now: Instant) -> Self {
         let apart = Apart::new(same.family(), families, same.is_trusted());
         let connection = same.identity().connection();
-        Self { same, look: Mutex::new(Look { apart, is_doubted: false, has_spoken: false, heard: now, connection }) }
+        Self {
+            same,
+            look: Mutex::new(Look {
+                apart,
+                is_doubted: false,
+                has_spoken: false,
+                heard: now,
+                connection,
+                own_words: None,
+                lost: 0,
+            }),
+        }
     }
 
     /// The line's clock when the unit last answered what it was asked, or may have; at first when this was made.
@@ -107,7 +148,7 @@ impl Aim {
         self.with(|look| {
             if look.connection != connection {
                 (look.apart, look.connection) = (self.apart(families, look.is_doubted), connection);
-                look.has_spoken = false;
+                (look.has_spoken, look.own_words) = (false, None);
             }
         });
     }
@@ -124,17 +165,30 @@ impl Aim {
         families: &Families,
         command: Command,
     ) -> Result<Option<Target>, NotTaken<E>> {
+        match self.taken(line, families, command).await? {
+            Some((target, true)) => self.in_its_words(line, families, target).await,
+            silent => Ok(silent.map(|(target, _)| target)),
+        }
+    }
+
+    /// The same, whatever words it takes, and whether it may be asked for those: not where it was silent just now.
+    async fn taken<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        families: &Families,
+        command: Command,
+    ) -> Result<Option<(Target, bool)>, NotTaken<E>> {
         let (what, unit) = (What::Command(command), self.same.unit());
         let is_doubted = || self.with(|look| look.is_doubted);
-        let named = || Some(Target { family: Arc::clone(self.same.family()), command });
-        if !is_doubted() && goes_out_at_once(&self.same, families, what, line.connection()) {
-            return Ok(named());
+        let named = |is_heard| Some((Target::of(self.same.family(), command), is_heard));
+        if !is_doubted() && is_identified(&self.same, families, what, line.connection()) {
+            return Ok(named(true));
         }
         for _ in 0..QUESTIONS {
             self.keep_to(line.connection(), families);
             let place = match self.with(|look| look.apart.verdict(what)) {
                 Verdict::Ask(place) => place,
-                Verdict::Take(family) => return self.target(line, family, command).map(Some),
+                Verdict::Take(family) => return self.target(line, family, command).map(|target| Some((target, true))),
                 Verdict::Undecided(others) => return Err(NotTaken::MayBe(others)),
             };
             let read = Read::word(unit, place).urgent(true).once_within(ANSWER_WITHIN);
@@ -149,7 +203,7 @@ impl Aim {
                 }
                 // Silence is no evidence. Where it spoke before, or against its name, the line lost this one.
                 Err(_) if is_doubted() || self.has_spoken() => return Ok(None),
-                Err(_) => return Ok(named()),
+                Err(_) => return Ok(named(false)),
             };
             self.keep_to(line.connection(), families);
             let is_telling = self.with(|look| {
@@ -163,6 +217,61 @@ impl Aim {
         Err(NotTaken::MayBe(Vec::new()))
     }
 
+    /// The `target`, in the words that the unit is set to take; `None` where it did not say yet.
+    async fn in_its_words<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        families: &Families,
+        target: Target,
+    ) -> Result<Option<Target>, NotTaken<E>> {
+        let (unit, family) = (self.same.unit(), &target.family);
+        let is_named = Arc::ptr_eq(family, self.same.family());
+        self.keep_to(line.connection(), families);
+        let opened = line.connection();
+        let is_known = if is_named {
+            self.same.identity().takes_own_words(opened)
+        } else {
+            self.with(|look| look.own_words.as_ref().is_some_and(|known| Arc::ptr_eq(known, family)))
+        };
+        if is_known || !family.has_dialects() {
+            return Ok(Some(target));
+        }
+        let asked = dialect(line, unit, family, |read| read.urgent(true).once_within(ANSWER_WITHIN)).await;
+        let heard = || self.with(|look| (look.has_spoken, look.heard) = (true, line.now()));
+        match asked {
+            // What was asked before the port was opened again may be another drive.
+            Ok(_) if line.connection() != opened => Ok(None),
+            Ok(Dialect::Own) => {
+                heard();
+                if is_named {
+                    self.same.identity().found_own_words(opened);
+                } else {
+                    self.with(|look| look.own_words = Some(Arc::clone(family)));
+                }
+                Ok(Some(target))
+            }
+            Ok(Dialect::Other(otherwise)) => {
+                heard();
+                match otherwise.halt(target.command) {
+                    Some(_) => Ok(Some(Target { otherwise: Some(otherwise), ..target })),
+                    None => Err(NotTaken::SetOtherwise(otherwise)),
+                }
+            }
+            Ok(Dialect::Untold) => {
+                heard();
+                Ok(None)
+            }
+            Err(error) if !error.cause().is_no_answer() => Err(NotTaken::NotTold(NotTold::Failed(error))),
+            // Silence is no evidence. Where it spoke before, the line lost this one.
+            Err(_) if self.has_spoken() => Ok(None),
+            Err(_) if self.same.identity().is_known(opened) && self.with(|look| look.lost) < AGAIN => {
+                self.with(|look| look.lost += 1);
+                Ok(None)
+            }
+            Err(_) => Ok(Some(target)),
+        }
+    }
+
     /// Whether it spoke yet, or spoke against its name when it was asked last.
     fn has_spoken(&self) -> bool {
         self.same.identity().contradicts() || self.with(|look| look.has_spoken)
@@ -174,11 +283,11 @@ impl Aim {
             if self.with(|look| look.apart.shows_named()) {
                 self.same.identity().settle(line.connection(), line.now());
             }
-            return Ok(Target { family, command });
+            return Ok(Target::of(&family, command));
         }
         match family.halt_for(command) {
             // That its own papers are thin is no reason to let it run: nothing else halts what shows this family.
-            Some(command) => Ok(Target { family, command }),
+            Some(command) => Ok(Target::of(&family, command)),
             None => Err(NotTaken::MayBe(vec![family])),
         }
     }
@@ -189,11 +298,26 @@ impl Aim {
 }
 
 /// Whether nothing is asked before `what` is sent: the line has identified the unit over this connection, or it harms no
-/// family.
+/// family; and where its drive may take other words, it said that it takes those of its profile.
+pub fn goes_out_at_once(same: &SameUnit, families: &Families, what: What, connection: u64) -> bool {
+    !is_in_doubt(same, what, connection) && is_identified(same, families, what, connection)
+}
+
+/// Whether `what` may mean something else to the unit, which did not say yet which words it takes.
+fn is_in_doubt(same: &SameUnit, what: What, connection: u64) -> bool {
+    let family = same.family();
+    let is_command = match what {
+        What::Command(_) => true,
+        What::Word(place) => !same.is_trusted() && family.commands_at(place),
+    };
+    is_command && family.has_dialects() && !same.identity().takes_own_words(connection)
+}
+
+/// Whether what the unit is is asked of nobody before `what` is sent.
 ///
 /// Where a name is said to be meant, only what the unit itself shows counts for a command. What speaks against a name is
 /// known of `families` alone: a unit of somebody's own one has to show it.
-pub fn goes_out_at_once(same: &SameUnit, families: &Families, what: What, connection: u64) -> bool {
+fn is_identified(same: &SameUnit, families: &Families, what: What, connection: u64) -> bool {
     let (identity, is_trusted) = (same.identity(), same.is_trusted());
     if identity.is_sure(connection) {
         return true;
@@ -220,9 +344,32 @@ pub async fn check_harmless<E: LineError>(
     same: &SameUnit,
     what: What,
 ) -> Result<(), NotTaken<E>> {
-    if goes_out_at_once(same, families, what, line.connection()) {
+    if !is_identified(same, families, what, line.connection()) {
+        check_family(line, families, same, what).await?;
+    }
+    let opened = line.connection();
+    if !is_in_doubt(same, what, opened) {
         return Ok(());
     }
+    for (place, row) in same.family().deciding() {
+        let answer = answer_at(line, Read::word(same.unit(), place)).await.map_err(NotTaken::NotTold)?;
+        match same.family().dialect_by(row, answer) {
+            Some(Dialect::Other(otherwise)) => return Err(NotTaken::SetOtherwise(otherwise)),
+            Some(Dialect::Untold) => return Err(NotTaken::MayBe(Vec::new())),
+            Some(Dialect::Own) | None => {}
+        }
+    }
+    same.identity().found_own_words(opened);
+    Ok(())
+}
+
+/// The same, of what the unit is.
+async fn check_family<E: LineError>(
+    line: &Mailbox<E>,
+    families: &Families,
+    same: &SameUnit,
+    what: What,
+) -> Result<(), NotTaken<E>> {
     let named = same.family();
     let mut apart = Apart::new(named, families, same.is_trusted());
     for _ in 0..QUESTIONS {

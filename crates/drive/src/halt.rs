@@ -26,6 +26,7 @@ use crate::asked::NotTold;
 use crate::families::Families;
 use crate::huanyang::may_be_of;
 use crate::record::Record;
+use crate::set_otherwise::SetOtherwise;
 use crate::taken::Taken;
 use crate::task::{Cause, LineError, Mailbox, Notice, Payload, Write};
 use proof::Proof;
@@ -100,6 +101,8 @@ pub struct Halt<E> {
     aim: Aim,
     /// What was sent last.
     command: Command,
+    /// What gives its words another meaning: it is halted by a word of that.
+    otherwise: Option<Box<SetOtherwise>>,
     told: Vec<Command>,
     began: Instant,
     until: Instant,
@@ -131,6 +134,7 @@ impl<E: LineError> Halt<E> {
             unit,
             record: record.clone(),
             command: order.command,
+            otherwise: None,
             told: Vec::new(),
             began: now,
             until: now + order.within,
@@ -236,13 +240,14 @@ impl<E: LineError> Halt<E> {
             Ok(Some(target)) => {
                 self.take_for(line, &target);
                 Self::check(&self.unit, self.command)?;
-                self.send(line).await
+                self.send(line, &target).await
             }
             Ok(None) | Err(NotTaken::NotTold(NotTold::Unreached { .. })) => {
                 self.heard = Some(line.now());
                 return Ok(false);
             }
             Err(NotTaken::MayBe(families)) => return Err(Why::Undecided { wanted, families }),
+            Err(NotTaken::SetOtherwise(otherwise)) => return Err(Why::SetOtherwise { wanted, otherwise }),
             Err(NotTaken::NotTold(NotTold::Failed(error) | NotTold::Busy { last: error, .. })) => Err(error),
         };
         match came {
@@ -256,6 +261,7 @@ impl<E: LineError> Halt<E> {
     fn take_for(&mut self, line: &Mailbox<E>, target: &Target) {
         self.unit = self.named.taken_for(&target.family, &self.record, line.connection());
         self.command = target.command;
+        self.otherwise.clone_from(&target.otherwise);
     }
 
     /// A frame came to nothing.
@@ -290,7 +296,7 @@ impl<E: LineError> Halt<E> {
         Arc::ptr_eq(self.unit.same().family(), self.named.same().family())
     }
 
-    async fn send(&mut self, line: &Mailbox<E>) -> Result<(), E> {
+    async fn send(&mut self, line: &Mailbox<E>, target: &Target) -> Result<(), E> {
         let (address, family) = (self.unit.same().unit(), self.unit.same().family());
         let line = &line.taken_for(address, family);
         self.record.note(|sent| sent.halts_begun += 1);
@@ -298,13 +304,12 @@ impl<E: LineError> Halt<E> {
         (self.sent, self.connection) = (line.now(), line.connection());
         self.is_confirmed = true;
         let profile = family.profile();
-        for (place, word) in [profile.command_first(self.command), profile.command(self.command)].into_iter().flatten()
-        {
+        for (place, word) in target.words() {
             let payload = Payload::Word(word).as_written(profile);
             let write = Write {
                 is_urgent: true,
-                // The line knows the unit by its name, and would hold the words of another family back.
-                is_forced: !self.is_as_named(),
+                // The line knows the unit by its name, and would hold back the words of another family, or of another setting.
+                is_forced: !self.is_as_named() || target.otherwise.is_some(),
                 timeout: Some(ANSWER_WITHIN),
                 // Behind a port that was opened again another drive may be, which has to say what it is.
                 connection: Some(self.connection),
@@ -329,6 +334,9 @@ impl<E: LineError> Halt<E> {
         self.record.note(|sent| sent.halts += 1);
         self.confirmed = line.now();
         line.tell(Notice::Took(self.command)).await;
+        if let (Some(otherwise), Some((_, word))) = (&target.otherwise, target.words().last()) {
+            line.tell(Notice::TookOther { command: self.command, word, otherwise: otherwise.clone() }).await;
+        }
         Ok(())
     }
 

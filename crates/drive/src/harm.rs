@@ -36,14 +36,29 @@ impl Family {
             What::Word(place) => self.starts_or_keeps(place),
             What::Command(command) => {
                 let words = [named.profile().command_first(command), named.command(command)];
-                words.into_iter().flatten().any(|word| self.is_harmed_by_word(word, command))
+                let is_harm = |word| self.is_harmed_by_word(word, command) || self.may_mean_else(word, named);
+                words.into_iter().flatten().any(is_harm)
             }
         }
     }
 
-    /// Whether the same words at the same places halt this family and `other`.
+    /// Whether the same words at the same places halt this family and `other`, whatever their units are set to.
     pub fn halts_like(&self, other: &Family) -> bool {
-        self.halts() == other.halts()
+        self.halts() == other.halts() && self.is_asked_like(other) && other.is_asked_like(self)
+    }
+
+    /// Whether `word` may start a unit that is set to take other words, and that was named as one of `named`, by which nobody asks
+    /// for that.
+    fn may_mean_else(&self, (place, word): (Place, u16), named: &Family) -> bool {
+        let mut others = self.deciding().flat_map(|(_, row)| &row.otherwise);
+        self.commands_at(place)
+            && !self.is_asked_like(named)
+            && others.any(|other| other.stop != Some(word) && other.coast != Some(word))
+    }
+
+    /// Whether a unit that was named as one of `named` is asked for all that decides which words one of this family takes.
+    fn is_asked_like(&self, named: &Family) -> bool {
+        self.deciding().all(|(place, _)| named.deciding().any(|(asked, _)| asked == place))
     }
 
     /// Whether `word`, meant as `command`, starts, reverses or sets anything.

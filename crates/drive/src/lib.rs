@@ -61,6 +61,7 @@
 //! | `speed` | how fast a motor turns, and how its drive slows it down |
 //! | `taken`, `unit` | a unit as the family that it is taken for, and as one call sees it |
 //! | `settled` | what a parameter of the drive decides of the meaning of its words |
+//! | `set_otherwise` | which words a unit takes, where a parameter of its drive decides that |
 //! | `wanted`, `settings` | what must be set in a drive so that it obeys the bus, and whether it is |
 //! | `writing` | one write to a unit that still is what it was |
 //! | `setpoint` | the frequency that a drive is to run at |
@@ -106,6 +107,7 @@ mod rule;
 mod same_unit;
 #[cfg(test)]
 mod scripted;
+mod set_otherwise;
 mod setpoint;
 mod settings;
 mod settled;
@@ -144,6 +146,7 @@ pub use ready::{Ignores, NotReady};
 pub use record::{Record, Sent};
 pub use rule::{Rule, WhyNot};
 pub use same_unit::{Identity, NotSame, SameUnit, Told};
+pub use set_otherwise::SetOtherwise;
 pub use setpoint::NotSet;
 pub use settings::Setting;
 pub use settled::NotSettled;

@@ -149,7 +149,7 @@ impl Unit {
     ///
     /// [`NotReady`]: it would not start, or not obey.
     pub async fn ready<E: LineError>(&self, line: &Mailbox<E>, by_bus: bool) -> Result<Look, NotReady<E>> {
-        self.require(line, wanted_always(self.profile()), Ignores::Words).await?;
+        self.require_words(line).await?;
         let look = self.look(line).await.map_err(NotReady::Failed)?;
         if look.is_tripped() {
             return Err(NotReady::InFault(look));
@@ -169,6 +169,23 @@ impl Unit {
             self.require(line, wanted, Ignores::Commands).await?;
         }
         Ok(look)
+    }
+
+    /// Whether the drive has its words where the profile has them, and they mean what it says.
+    async fn require_words<E: LineError>(&self, line: &Mailbox<E>) -> Result<(), NotReady<E>> {
+        let (wanted, opened, identity) = (wanted_always(self.profile()), line.connection(), self.same().identity());
+        let decides = |row: &&Control| row.decides_words();
+        let is_asked = |row: &Control| {
+            self.is_sure(row) && self.profile().find(&row.code).is_ok_and(|e| self.rule().read(e).is_ok())
+        };
+        let tells_words = wanted.iter().filter(decides).all(is_asked);
+        let required = self.require(line, wanted, Ignores::Words).await;
+        match &required {
+            Ok(()) if tells_words && line.connection() == opened => identity.found_own_words(opened),
+            Err(NotReady::Settings { .. }) => identity.forget_words(),
+            _ => {}
+        }
+        required
     }
 
     /// Whether the drive takes its speed from the bus.

@@ -90,9 +90,13 @@ impl Unit {
     }
 
     fn sure(&self, mut wanted: Vec<Control>) -> Vec<Control> {
-        let is_trusted = self.rule().trusts_all();
-        wanted.retain(|row| row.verified || is_trusted);
+        wanted.retain(|row| self.is_sure(row));
         wanted
+    }
+
+    /// Whether a start depends on it.
+    pub(crate) fn is_sure(&self, row: &Control) -> bool {
+        row.verified || self.rule().trusts_all()
     }
 
     /// What each of `wanted` is.

@@ -129,8 +129,22 @@ impl Unit {
         Ok(connection.min(opened))
     }
 
+    /// What decides which words the unit takes is asked again where it is written.
+    fn forget_words_after(&self, words: &Words) {
+        let first = words.place.number();
+        let end = match &words.payload {
+            Payload::Word(_) => first + 1,
+            Payload::Words(words) => (first..).nth(words.len()).unwrap_or(u32::MAX),
+        };
+        let mut deciding = self.family().deciding();
+        if deciding.any(|(place, _)| (first..end).contains(&place.number())) {
+            self.same().identity().forget_words();
+        }
+    }
+
     /// Writes to whatever unit answers over this connection. One that says that it took it and is still at it has taken it.
     async fn send<E: LineError>(&self, line: &Mailbox<E>, words: &Words, connection: u64) -> Result<(), E> {
+        self.forget_words_after(words);
         let write = Write {
             read_back: words.read_back,
             connection: Some(connection),

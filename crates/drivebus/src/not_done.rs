@@ -11,7 +11,7 @@ use crate::error::Error;
 impl From<NotHalted<Self>> for Error {
     fn from(error: NotHalted<Self>) -> Self {
         let kind = match &error.why {
-            Why::MayNot(_) | Why::Undecided { .. } => ErrorKind::NotAllowed,
+            Why::MayNot(_) | Why::Undecided { .. } | Why::SetOtherwise { .. } => ErrorKind::NotAllowed,
             Why::NotSent(line) | Why::Failed(line) => line.kind(),
             Why::Refused { .. } => ErrorKind::Refused,
             _ => ErrorKind::Unconfirmed,

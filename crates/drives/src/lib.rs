@@ -87,7 +87,7 @@ pub use entry::{Access, AccessError, Entry, Kind, Store};
 pub use evidence::Evidence;
 pub use load::ProfileError;
 pub use parts::called::{Alias, Called};
-pub use parts::command::{Command, CommandCode, Control, ParseCommandError, StartWord, Until};
+pub use parts::command::{Command, CommandCode, Control, OtherWords, ParseCommandError, StartWord, Until};
 pub use parts::fault::{Exception, Fault, Means};
 pub use parts::identification::{Identification, Signature};
 pub use parts::memory::{Memory, MemoryBit, StoreWord, ToldBy};

@@ -5,6 +5,7 @@ use drivebus_drive::{self as drive, Besides, Families, NotHalted, Order, Taken, 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
+use crate::aim::set_otherwise;
 use crate::clock::{duration, to_seconds};
 use crate::errors::refuse;
 use crate::family::{against, names};
@@ -88,6 +89,9 @@ fn told_of(py: Python<'_>, why: Why<Failed>) -> PyResult<(&'static str, Py<PyAny
     Ok(match why {
         Why::MayNot(_) => ("may_not", py.None()),
         Why::Undecided { wanted, families } => ("undecided", (wanted.name(), names(&families)).into_py_any(py)?),
+        Why::SetOtherwise { wanted, otherwise } => {
+            ("set_otherwise", (wanted.name(), set_otherwise(*otherwise)).into_py_any(py)?)
+        }
         Why::Unsaid => ("unsaid", py.None()),
         Why::NotSent(error) => ("not_sent", raised(error).into_py_any(py)?),
         Why::Refused { last, tries, after } => {

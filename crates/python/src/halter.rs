@@ -58,7 +58,7 @@ impl Halter for ByFamily {
             Ok(()) => Halted::Took(format!("{as_what}It has no state that may be used for a proof")),
             Err(NotHalted { why, .. }) => match why {
                 Why::MayNot(_) => Halted::Unknown,
-                Why::Undecided { .. } => Halted::Another,
+                Why::Undecided { .. } | Why::SetOtherwise { .. } => Halted::Another,
                 Why::Failed(_) => Halted::GivenUp,
                 Why::Unsaid | Why::NotSent(_) | Why::Refused { .. } | Why::Unanswered { .. } if !was_told => {
                     Halted::NotTaken

@@ -13,6 +13,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
+use crate::aim::set_otherwise;
 use crate::clock::moment;
 use crate::errors::Class;
 use crate::shown_look::shown;
@@ -147,6 +148,9 @@ impl Task {
             Step::Wish(Wish::Tell(Notice::Shows(state))) => Ok(("shows", state.name().into_bound_py_any(py)?)),
             Step::Wish(Wish::Tell(Notice::Starts(command))) => Ok(("starts", command.name().into_bound_py_any(py)?)),
             Step::Wish(Wish::Tell(Notice::Took(command))) => Ok(("took", command.name().into_bound_py_any(py)?)),
+            Step::Wish(Wish::Tell(Notice::TookOther { command, word, otherwise })) => {
+                Ok(("took_other", (command.name(), word, set_otherwise(*otherwise)).into_bound_py_any(py)?))
+            }
             Step::Wish(Wish::Tell(Notice::Saw(look))) => Ok(("saw", shown(look).into_bound_py_any(py)?)),
             Step::Wish(Wish::Tell(Notice::Stored { name, times })) => {
                 Ok(("stored", (name, times).into_bound_py_any(py)?))

@@ -34,7 +34,7 @@ pub(crate) use map::Map;
 use refusal::Refusal;
 use refusing::Refusing;
 pub use refusing::{Asked, Refusals};
-use settings::all_are;
+use settings::obeys;
 use store::Store;
 
 /// How many writes a drive remembers.
@@ -367,6 +367,6 @@ impl Drive {
 
     /// Whether commands from the bus move the motor.
     fn obeys_bus(&self) -> bool {
-        all_are(&self.store, &self.family().roles.obeys)
+        obeys(self.family(), &self.store)
     }
 }

@@ -17,6 +17,7 @@ from drivebus.advice import Text, argument
 from drivebus.errors import LINE_ERRORS, DrivebusError, NotAllowed, WrongDrive
 from drivebus.identify.families import asked_as, one_of
 from drivebus.identify.refusals import busy
+from drivebus.operations import other_words
 from drivebus.operations.drive_view import DriveView
 from drivebus.profile import Profile
 
@@ -30,6 +31,8 @@ def harmed(unit: DriveView, kind: str, told: Any) -> DrivebusError:
     """
     if kind == "may_be":
         return _another(unit, profiles_of(unit, told))
+    if kind == "set_otherwise":
+        return other_words.not_written(unit, other_words.SetOtherwise(*told))
     error: DrivebusError = told
     if kind == "busy":
         error = busy(unit.address, *told)

@@ -12,7 +12,7 @@ from typing import Any
 
 from drivebus import _native
 from drivebus.line.tasks import carried_out
-from drivebus.operations import events, glances, kept
+from drivebus.operations import events, glances, kept, other_words
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.explained import explained
 from drivebus.operations.program_end import before_start
@@ -56,6 +56,9 @@ def hear(unit: DriveView, kind: str, told: Any) -> None:
         glances.keep(unit, glances.shown(unit, told))
     elif kind == "shows":
         glances.remember(unit, str(State(told)))
+    elif kind == "took_other":
+        command, word, otherwise = told
+        other_words.took(unit, said(command), word, other_words.SetOtherwise(*otherwise))
     elif kind == "stored":
         kept.warn_of_wear(unit, *told)
     else:

@@ -10,7 +10,7 @@ import sys
 from drivebus.operations.drive_view import DriveView
 from drivebus.values import State
 
-__all__ = ["LOGGER", "answered", "failed", "saw", "took"]
+__all__ = ["LOGGER", "answered", "failed", "saw", "took", "took_other"]
 
 LOGGER = "drivebus.drive"
 
@@ -18,6 +18,11 @@ LOGGER = "drivebus.drive"
 def took(unit: DriveView, command: str) -> None:
     """The drive took *command*, as it says."""
     _tell("INFO", unit, f"took {command}")
+
+
+def took_other(unit: DriveView, text: str) -> None:
+    """The drive took a word of another control profile, as *text* says."""
+    _tell("WARNING", unit, text)
 
 
 def saw(unit: DriveView, state: State, fault: str | None) -> None:

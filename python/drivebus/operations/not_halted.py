@@ -7,7 +7,7 @@ from typing import Any
 
 from drivebus.errors import DrivebusError, NotAllowed, Refused, Unconfirmed
 from drivebus.identify.contradiction import in_words as contradiction
-from drivebus.operations import glances
+from drivebus.operations import glances, other_words
 from drivebus.operations.aim import profiles_of, undecided
 from drivebus.operations.drive_view import DriveView
 from drivebus.operations.said import MAY, said
@@ -33,7 +33,7 @@ def in_words(named: DriveView, unit: DriveView, command: str, found: float, reas
         failed: DrivebusError = told
         return failed
     cause = None
-    if reason in ("may_not", "undecided"):
+    if reason in ("may_not", "undecided", "set_otherwise"):
         error = _not_sent(named, unit, command, reason, told)
     elif reason == "unsaid":
         error = _unsaid(unit, command, found)
@@ -60,6 +60,9 @@ def _not_sent(named: DriveView, unit: DriveView, command: str, reason: str, told
     if reason == "undecided":
         wanted, families = told
         return undecided(named, wanted, profiles_of(named, families))
+    if reason == "set_otherwise":
+        wanted, otherwise = told
+        return other_words.refused(unit, wanted, other_words.SetOtherwise(*otherwise))
     if reason == "failed":
         failed: DrivebusError = told
         return failed

@@ -229,3 +229,85 @@ fn what_was_answered_before_the_port_was_lost_says_nothing_of_who_is_there_now()
     aimed.stop(gd350);
     assert_eq!(aimed.script.places(), asked);
 }
+
+/// An Altivar 600 whose CHCF, at 8401, is as `chcf` says. EAV64332, V3.7: 3 is the I/O profile, in which bit 0 of CMD runs the motor.
+fn atv600(chcf: Reply) -> impl FnMut(Read) -> Reply {
+    let family = shipped("atv600");
+    move |read| if read.place == Place::from(8401) { chcf.clone() } else { like(&family, &[(3201, 0x0233)])(read) }
+}
+
+fn words(target: Option<Target>) -> Vec<(Place, u16)> {
+    target.unwrap().words().collect()
+}
+
+#[test]
+fn which_words_a_unit_takes_is_asked_before_a_halt_and_not_again() {
+    let mut aimed = Aimed::of("atv600");
+    assert_eq!(words(aimed.take(Command::Stop, atv600(Ok(1))).unwrap()), [(8501.into(), 7)]);
+    let last = aimed.script.asked.last().unwrap();
+    assert_eq!((last.place, last.is_urgent, last.retries), (8401.into(), true, Some(0)));
+    assert_eq!(words(aimed.take(Command::Stop, |_| panic!("it said so")).unwrap()), [(8501.into(), 7)]);
+    // Behind a port that was opened again another one may answer.
+    aimed.script.connection += 1;
+    assert_eq!(words(aimed.take(Command::Stop, atv600(Ok(3))).unwrap()), [(8501.into(), 0)]);
+}
+
+#[test]
+fn one_that_takes_others_is_halted_by_those_and_asked_each_time() {
+    let mut aimed = Aimed::of("atv600");
+    for command in [Command::Stop, Command::Coast] {
+        let target = aimed.take(command, atv600(Ok(3))).unwrap();
+        assert_eq!(words(target), [(8501.into(), 0)]);
+    }
+    assert!(!aimed.at_once(STOP));
+    let error = aimed.take(Command::Stop, atv600(Ok(9))).unwrap_err();
+    assert!(matches!(&error, NotTaken::SetOtherwise(found) if found.raw == 9 && found.means().is_empty()), "{error}");
+    // It is put right.
+    assert_eq!(words(aimed.take(Command::Stop, atv600(Ok(2))).unwrap()), [(8501.into(), 7)]);
+}
+
+/// As with what a unit is: silence and a refusal are no evidence, and one that is busy did not say yet.
+#[test]
+fn one_that_does_not_say_which_words_it_takes_is_halted_as_named() {
+    let mut aimed = Aimed::of("atv600");
+    assert!(aimed.take(Command::Stop, atv600(refuses(0x06))).unwrap().is_none());
+    // It spoke before, so that the line lost this one.
+    assert!(aimed.take(Command::Stop, atv600(fails(Cause::NoAnswer))).unwrap().is_none());
+    assert_eq!(words(aimed.take(Command::Stop, atv600(refuses(0x02))).unwrap()), [(8501.into(), 7)]);
+    // Nothing at all comes: one question tells that.
+    let mut aimed = Aimed::of("atv600");
+    assert_eq!(words(aimed.take(Command::Stop, |_| fails(Cause::NoAnswer)).unwrap()), [(8501.into(), 7)]);
+    assert_eq!(aimed.script.asked.len(), 1);
+}
+
+#[test]
+fn no_other_command_goes_to_one_that_takes_other_words() {
+    for what in [What::Command(Command::ResetFault), What::Word(8501.into())] {
+        let mut aimed = Aimed::of("atv600");
+        let error = aimed.check_harmless(what, atv600(Ok(3))).unwrap_err();
+        let said = "the command words of the unit mean something else: CHCF is 3 (the I/O profile: bits 0 and 1 run the motor), and \
+                    must be 1 (the words are those of CiA 402, and commands come from where the setpoint does)";
+        assert_eq!(error.to_string(), said);
+        aimed.check_harmless(what, atv600(Ok(1))).unwrap();
+        let asked = |aimed: &Aimed| aimed.script.asked.iter().filter(|read| read.place == Place::from(8401)).count();
+        assert_eq!(asked(&aimed), 1);
+        aimed.check_harmless(what, atv600(Ok(1))).unwrap();
+        assert_eq!(asked(&aimed), 0, "it said so");
+    }
+    // A value is no command: it can be put right over the bus.
+    Aimed::of("atv600").check_harmless(What::Word(8401.into()), atv600(Ok(3))).unwrap();
+}
+
+/// ACS355 manual, p. 313: it has no such profile at its register. By its name nobody would ask an ACS580.
+#[test]
+fn a_sister_with_the_same_words_counts_as_harmed_where_it_may_take_others() {
+    let harmed = |named: &str, command| {
+        let harmed = Families::shipped().harmed(What::Command(command), &shipped(named));
+        harmed.iter().map(|family| family.name().to_owned()).collect::<Vec<_>>()
+    };
+    assert!(harmed("acs355", Command::Stop).contains(&"acs580".to_owned()));
+    assert!(harmed("atv312", Command::Stop).contains(&"atv600".to_owned()));
+    // 0 stops in each of its profiles.
+    assert!(!harmed("atv312", Command::Coast).contains(&"atv600".to_owned()));
+    assert!(!harmed("acs580", Command::Stop).contains(&"acs355".to_owned()));
+}

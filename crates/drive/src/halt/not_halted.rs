@@ -11,6 +11,7 @@ use thiserror::Error;
 use crate::contradiction::Contradiction;
 use crate::family::Family;
 use crate::look::Look;
+use crate::set_otherwise::SetOtherwise;
 use crate::task::{Cause, LineError};
 
 /// A unit that is not known to be halted: its motor may still turn. `E` is the error of whoever drives.
@@ -47,6 +48,14 @@ pub enum Why<E> {
         wanted: Command,
         /// What it may be.
         families: Vec<Arc<Family>>,
+    },
+    /// The drive is set to take other words, none of which is known to halt it. Nothing was sent.
+    #[error("it was not sent, for it may start the motor: {otherwise}")]
+    SetOtherwise {
+        /// What was to be sent, by its name.
+        wanted: Command,
+        /// How it is set.
+        otherwise: Box<SetOtherwise>,
     },
     /// The unit speaks, and does not say what it is, in all that time. Nothing was sent.
     #[error("it was not sent, for it may start the motor: the unit is busy, and does not say what it is")]
@@ -139,7 +148,7 @@ impl<E: LineError> Why<E> {
     /// Whether nothing goes out, whatever the line does.
     pub(super) fn is_forbidden(&self) -> bool {
         match self {
-            Self::MayNot(_) | Self::Undecided { .. } => true,
+            Self::MayNot(_) | Self::Undecided { .. } | Self::SetOtherwise { .. } => true,
             Self::Failed(error) => matches!(error.cause(), Cause::Other | Cause::Halted),
             _ => false,
         }

@@ -452,7 +452,11 @@ proptest! {
         let halted = halt_over(script, &family, order, unit);
         let seen = halted.script.told.iter().rev().find_map(|notice| match notice {
             Notice::Saw(look) => Some(look.state),
-            Notice::Took(_) | Notice::Shows(_) | Notice::Starts(_) | Notice::Stored { .. } => None,
+            Notice::Took(_)
+            | Notice::TookOther { .. }
+            | Notice::Shows(_)
+            | Notice::Starts(_)
+            | Notice::Stored { .. } => None,
         });
         let sent = halted.record.sent();
         prop_assert!(sent.halts <= sent.halts_begun && sent.halts_begun <= halted.script.sent.len() as u64);

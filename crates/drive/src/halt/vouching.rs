@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use drivebus_drives::Command;
+
 use super::not_halted::Why;
 use super::proof::Proof;
 use super::{Halt, PAUSE};
@@ -12,6 +14,7 @@ use crate::contradiction::Contradiction;
 use crate::families::Families;
 use crate::harm::What;
 use crate::same_unit::Against;
+use crate::set_otherwise::{Dialect, dialect};
 use crate::task::{Cause, LineError, Mailbox};
 
 /// Time for which a unit that does not show a halt is asked what it is, while it is not heard.
@@ -38,15 +41,19 @@ impl<E: LineError> Halt<E> {
     pub(super) async fn prove(&mut self, line: &Mailbox<E>, families: &Families) -> Result<Proof, Why<E>> {
         self.vouch(line, families).await?;
         let moments = (self.sent, self.confirmed);
-        Ok(Proof::new(&self.unit, self.command, moments, self.order.confirm, line.now()))
+        // By which ramp a word of another setting stops it, nobody knows.
+        let command = if self.otherwise.is_some() { Command::Coast } else { self.command };
+        Ok(Proof::new(&self.unit, command, moments, self.order.confirm, line.now()))
     }
 
     /// Asks nothing of a unit that this line has identified, or that was halted as what it showed.
     async fn vouch(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {
         if !self.is_as_named() || self.unit.same().identity().is_known(line.connection()) {
-            return Ok(());
+            return self.vouch_words(line, families).await;
         }
-        let Some(against) = self.contradiction(line, families).await? else { return Ok(()) };
+        let Some(against) = self.contradiction(line, families).await? else {
+            return self.vouch_words(line, families).await;
+        };
         // One that speaks against its name again and again is not given time again and again: it would never end.
         if self.aim.doubt(families) {
             self.until = line.now() + self.order.within;
@@ -57,6 +64,35 @@ impl<E: LineError> Halt<E> {
             }
             done => done,
         }
+    }
+
+    /// Asks which words it takes of a unit that was silent when it was to say so. One that takes others is halted once more, by those.
+    async fn vouch_words(&mut self, line: &Mailbox<E>, families: &Families) -> Result<(), Why<E>> {
+        let (same, connection) = (self.unit.same(), line.connection());
+        let (family, is_told) = (same.family(), same.identity().takes_own_words(connection));
+        if is_told || self.otherwise.is_some() || !self.is_as_named() || !family.has_dialects() {
+            return Ok(());
+        }
+        for _ in 0..=AGAIN {
+            match dialect(line, same.unit(), family, |read| read.urgent(true)).await {
+                Ok(Dialect::Own) => {
+                    same.identity().found_own_words(connection);
+                    return Ok(());
+                }
+                Ok(Dialect::Other(_)) => {
+                    self.until = line.now() + self.order.within;
+                    return match self.once_more(line, families).await {
+                        Err(why) if why.is_forbidden() => Err(Why::Another { against: None, then: Box::new(why) }),
+                        done => done,
+                    };
+                }
+                Ok(Dialect::Untold) => {}
+                Err(error) if error.cause().is_of_the_line() => {}
+                Err(error) => return Err(Why::Failed(error)),
+            }
+            line.sleep(PAUSE).await.map_err(Why::Failed)?;
+        }
+        Ok(())
     }
 
     /// Has the unit say anew what it is. One that shows another family is halted once more, as that.
@@ -85,6 +121,10 @@ impl<E: LineError> Halt<E> {
                     let then = Box::new(Why::Undecided { wanted: self.command, families });
                     return Err(Why::Another { against: None, then });
                 }
+                Err(NotTaken::SetOtherwise(otherwise)) => {
+                    let then = Box::new(Why::SetOtherwise { wanted: self.command, otherwise });
+                    return Err(Why::Another { against: None, then });
+                }
                 Err(NotTaken::NotTold(NotTold::Failed(error))) => Err(error),
             };
             if let Err(error) = failed {
@@ -98,10 +138,13 @@ impl<E: LineError> Halt<E> {
             }
         };
         let taken = self.named.taken_for(&target.family, &self.record, line.connection());
-        if Arc::ptr_eq(taken.same().family(), self.unit.same().family()) {
+        let is_same = Arc::ptr_eq(taken.same().family(), self.unit.same().family());
+        if is_same && target.otherwise == self.otherwise {
             return Ok(Anew::Same);
         }
-        self.unit.same().identity().is_another();
+        if !is_same {
+            self.unit.same().identity().is_another();
+        }
         self.until = line.now() + self.order.within;
         self.once_more(line, families).await?;
         Ok(Anew::Another)

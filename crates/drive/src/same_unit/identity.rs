@@ -31,6 +31,8 @@ pub(super) struct Known {
     pub(super) contradicts: bool,
     /// Whether they leave no other family that one of its halts could start.
     pub(super) is_sure: bool,
+    /// The connection over which it said that it takes the words of its profile; `None`: it did not say so yet.
+    pub(super) own_words: Option<u64>,
     /// The places that no family which it may be keeps words of, or starts by.
     pub(super) harmless: BTreeSet<Place>,
 }
@@ -45,6 +47,7 @@ impl Identity {
             spoke: false,
             contradicts: false,
             is_sure: false,
+            own_words: None,
             harmless: BTreeSet::new(),
         };
         Self(Arc::new(Mutex::new(known)))
@@ -78,6 +81,21 @@ impl Identity {
     /// Whether a word at `place` was found to do no harm to it, over this connection.
     pub fn is_harmless(&self, place: Place, connection: u64) -> bool {
         self.with(|known| known.harmless.contains(&place) && known.connection == connection)
+    }
+
+    /// Whether it said, over this connection, that it is set to take the words of its profile.
+    pub fn takes_own_words(&self, connection: u64) -> bool {
+        self.with(|known| known.own_words == Some(connection))
+    }
+
+    /// It said so over this connection.
+    pub(crate) fn found_own_words(&self, connection: u64) {
+        self.with(|known| known.own_words = Some(connection));
+    }
+
+    /// It may have been set otherwise: that is asked again.
+    pub(crate) fn forget_words(&self) {
+        self.with(|known| known.own_words = None);
     }
 
     /// Whether what it said was said so long ago that another drive may have taken its place unseen.

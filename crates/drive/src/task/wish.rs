@@ -8,6 +8,7 @@ use drivebus_rtu::UnitAddress;
 
 use super::Outcome;
 use crate::look::Look;
+use crate::set_otherwise::SetOtherwise;
 
 const WRITE_ONE: u8 = 0x06;
 
@@ -62,6 +63,9 @@ impl fmt::Display for Wish {
             Self::Tell(Notice::Saw(look)) => write!(f, "to tell that a look showed {look}"),
             Self::Tell(Notice::Shows(state)) => write!(f, "to tell that the state is {}", state.name()),
             Self::Tell(Notice::Starts(command)) => write!(f, "to tell that {} is about to be sent", command.name()),
+            Self::Tell(Notice::TookOther { command, word, .. }) => {
+                write!(f, "to tell that {word:04X}H was taken for {}", command.name())
+            }
             Self::Tell(Notice::Stored { name, times }) => write!(f, "to tell that {name} was stored {times} times"),
         }
     }
@@ -215,6 +219,15 @@ impl fmt::Display for Write {
 pub enum Notice {
     /// The unit took this command, as it says.
     Took(Command),
+    /// The drive is set to take other words: it took this one of them, which does what the command is for.
+    TookOther {
+        /// The command.
+        command: Command,
+        /// What was sent.
+        word: u16,
+        /// How it is set.
+        otherwise: Box<SetOtherwise>,
+    },
     /// A look showed this.
     Saw(Look),
     /// The state word alone showed this.

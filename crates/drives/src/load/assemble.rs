@@ -12,6 +12,7 @@ use super::placed::Placed;
 use super::problems::Problems;
 use super::{File, inherit, rows, sense, sequence, succeed};
 use crate::entry::{Access, Entry};
+use crate::parts::command::Control;
 use crate::parts::rules::{Groups, Requests, UnitKind};
 use crate::parts::setpoint::{Setpoint, SetpointRole};
 use crate::place::Table;
@@ -330,6 +331,12 @@ fn in_unit(
 fn lists(file: &File, manifest: &Manifest, profile: &mut Profile, entries: &Entries, problems: &mut Problems) {
     if let Some(control) = &manifest.control {
         profile.control = facts::control(file, entries, control, problems);
+        let halts = |row: &Control| row.otherwise.iter().any(|other| other.stop.or(other.coast).is_some());
+        // What the state says then, nobody knows.
+        if profile.control.iter().any(halts) && !profile.state_word().is_some_and(|word| word.rest_by_frequency) {
+            let reason = "a word that halts with other words needs \"rest_by_frequency = true\" in [state]";
+            problems.add(file, control.first().map_or(1, |row| line(file, row)), reason);
+        }
     }
     if let Some(monitor) = &manifest.monitor {
         profile.monitor = entries.names(file, &monitor.registers, problems);
@@ -353,6 +360,9 @@ fn setpoints(
             problems.add(file, line(file, &row.register), "a rectifier feeds no motor: it has no frequency");
         }
         let needs = facts::control(file, entries, &row.needs, problems);
+        if needs.iter().any(Control::decides_words) {
+            problems.add(file, line(file, &row.register), "\"otherwise\" is for [[control]], not for a setpoint");
+        }
         let register = entries.get(file, &row.register, problems).map(|entry| entry.name.clone());
         known.extend(register.map(|register| (setpoint, SetpointRole { register, needs })));
     }

@@ -11,7 +11,7 @@ use super::{File, ProfileError};
 use crate::bits::BitField;
 use crate::decimal::{Counts, Decimal};
 use crate::parts::called::{Alias, Called};
-use crate::parts::command::Control;
+use crate::parts::command::{Control, OtherWords};
 use crate::parts::fault::{Exception, Means};
 use crate::parts::identification::{Identification, Signature};
 use crate::parts::memory::{Memory, StoreWord, ToldBy};
@@ -167,13 +167,39 @@ pub(super) fn control(
         if !row.verified && row.note.is_empty() {
             problems.add(file, line(file, spanned), "a value that is not verified needs a \"note\" that says why");
         }
-        let raw = check(file, line(file, spanned), &entry.quantity, &entry.name, row.value);
-        known.extend(problems.keep(raw).map(|raw| Control {
+        if !row.otherwise.is_empty() && !row.always {
+            problems.add(file, line(file, spanned), "what decides the words of commands needs \"always = true\"");
+        }
+        let mut word = |line, value| problems.keep(check(file, line, &entry.quantity, &entry.name, value));
+        let raw = word(line(file, spanned), row.value);
+        let same = row.same.iter().filter_map(|&value| word(line(file, spanned), value)).collect::<Vec<_>>();
+        let mut otherwise = Vec::new();
+        for spanned in &row.otherwise {
+            let other = spanned.get_ref();
+            otherwise.extend(word(line(file, spanned), other.value).map(|raw| OtherWords {
+                raw,
+                means: other.means.clone(),
+                stop: other.stop,
+                coast: other.coast,
+                source: other.source.clone(),
+            }));
+        }
+        let mut seen: Vec<u16> = raw.into_iter().chain(same.iter().copied()).collect();
+        for other in &otherwise {
+            if seen.contains(&other.raw) {
+                let reason = format!("{} = {} is there twice, or both the same and otherwise", entry.name, other.raw);
+                problems.add(file, line(file, spanned), reason);
+            }
+            seen.push(other.raw);
+        }
+        known.extend(raw.map(|raw| Control {
             code: entry.name.clone(),
             raw,
             label: row.label.clone(),
             always: row.always,
             by_hand: row.by_hand,
+            same,
+            otherwise,
             verified: row.verified,
             note: row.note.clone(),
             source: row.source.clone(),

@@ -131,10 +131,59 @@ pub struct Control {
     pub always: bool,
     /// Whether setting it does more than make the drive obey the bus: it is left to who asks for it by its name.
     pub by_hand: bool,
+    /// Other words with which commands mean what they mean with `raw`.
+    pub same: Vec<u16>,
+    /// Words with which commands mean something else. Where there is one, the parameter is read before the first command, also
+    /// before one that halts.
+    pub otherwise: Vec<OtherWords>,
     /// Whether a document of this family prints the value; else it is assumed.
     pub verified: bool,
     /// What to know about it; may be empty.
     pub note: String,
     /// Where it is printed.
     pub source: String,
+}
+
+impl Control {
+    /// Whether it decides what the words of commands mean.
+    pub fn decides_words(&self) -> bool {
+        !self.otherwise.is_empty()
+    }
+
+    /// Whether commands mean what the profile says where the parameter holds `raw`; so they do if it decides nothing.
+    pub fn keeps_words(&self, raw: u16) -> bool {
+        !self.decides_words() || raw == self.raw || self.same.contains(&raw)
+    }
+
+    /// What is known of `raw`, with which the words of commands mean something else.
+    pub fn other_words(&self, raw: u16) -> Option<&OtherWords> {
+        self.otherwise.iter().find(|row| row.raw == raw)
+    }
+}
+
+/// A word of a parameter with which the words of commands mean something else: another control profile of the drive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct OtherWords {
+    /// What the parameter holds.
+    pub raw: u16,
+    /// What the words mean then.
+    pub means: String,
+    /// The word that stops the motor then, in the register of commands; `None`: none is known.
+    pub stop: Option<u16>,
+    /// The one that lets it coast then; `None`: none is known.
+    pub coast: Option<u16>,
+    /// Where it is printed.
+    pub source: String,
+}
+
+impl OtherWords {
+    /// The word that does then what `command`, which halts, is for: the nearest there is.
+    pub fn halt(&self, command: Command) -> Option<u16> {
+        match command {
+            Command::Coast => self.coast.or(self.stop),
+            Command::Stop | Command::JogStop => self.stop.or(self.coast),
+            _ => None,
+        }
+    }
 }

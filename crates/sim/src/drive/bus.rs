@@ -6,11 +6,12 @@
 use drivebus_rtu::huanyang::{Huanyang, Protocol};
 use drivebus_rtu::{Adu, Answer, ExceptionCode, Instant, MAX_PDU, Request, RequestError, Table, Words, function};
 
-use super::family::{Memory, Range};
+use super::family::{Memory, OtherWords, Range};
 use super::machine::{Command, Direction, RunState};
 use super::map::{Access, Word};
 use super::places::{spot, table_of};
 use super::refusal::Refusal;
+use super::settings::all_are;
 use super::{Drive, WRITES_KEPT, WriteRecord};
 
 /// The most words that any family takes in one request.
@@ -270,7 +271,7 @@ impl Drive {
         let fits = match target {
             Word::Parameter(parameter) => parameter.bounds.allows(word, |bound| self.parameter(bound)),
             Word::Register(_) if family.takes_commands(address) => {
-                family.command_at(address, self.control_word(address), word).is_some()
+                self.meant(address, self.control_word(address), word).is_some()
             }
             Word::Register(register) => match register.range {
                 Range::Words(low, high) => (low..=high).contains(&word),
@@ -286,6 +287,20 @@ impl Drive {
         if fits { Ok(()) } else { Err(Refusal::Value) }
     }
 
+    /// What `word` at `address` commands, in the words that the drive is set to take.
+    fn meant(&self, address: u32, before: u16, word: u16) -> Option<Command> {
+        let family = self.family();
+        match self.other_words().filter(|_| family.takes_commands(address)) {
+            Some(other) => Some((other.decode)(before, word)),
+            None => family.command_at(address, before, word),
+        }
+    }
+
+    /// The other meaning of its commands, where the drive is set to that.
+    fn other_words(&self) -> Option<OtherWords> {
+        self.family().roles.other_words.filter(|other| all_are(&self.store, &[other.set_by]))
+    }
+
     /// What `word` at `address` tells the machine. A run turns the way that another word says, where a family has one, and
     /// so does a motor that runs when that word changes.
     fn command_at(&self, address: u32, before: u16, word: u16) -> Option<Command> {
@@ -297,7 +312,7 @@ impl Drive {
                 },
             );
         let runs = || matches!(self.machine.state(), RunState::Forward | RunState::Reverse);
-        match (self.family().command_at(address, before, word), turns) {
+        match (self.meant(address, before, word), turns) {
             (Some(Command::Run(_)), Some(turns)) => Some(Command::Run(turns)),
             (None, Some(turns)) if direction.is_some_and(|(place, _)| place == address) && runs() => {
                 Some(Command::Run(turns))
@@ -355,7 +370,8 @@ impl Drive {
     /// at once.
     fn obey(&mut self, address: u32, word: u16, command: Command) {
         let family = self.map.family();
-        let handshake = family.roles.handshake.as_ref().filter(|_| family.command == Some(address));
+        let handshake =
+            family.roles.handshake.as_ref().filter(|_| family.command == Some(address) && self.other_words().is_none());
         if let Some(handshake) = handshake {
             let is_running = self.machine.is_running();
             match command {

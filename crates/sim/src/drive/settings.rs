@@ -16,6 +16,16 @@ pub(super) fn all_are(store: &Store, parameters: &[(u16, u16)]) -> bool {
     parameters.iter().all(|&(address, value)| store.get(address) == Some(value))
 }
 
+/// Whether commands from the bus are obeyed. Where they have another meaning, the parameter that decides it stands at that.
+pub(super) fn obeys(family: &Family, store: &Store) -> bool {
+    let is_set = |&(address, value): &(u16, u16)| {
+        let is_otherwise =
+            family.roles.other_words.is_some_and(|other| other.set_by.0 == address && all_are(store, &[other.set_by]));
+        is_otherwise || all_are(store, &[(address, value)])
+    };
+    family.roles.obeys.iter().all(is_set)
+}
+
 /// Reads the settings from the parameters in force and from `speed`, the word of the speed that the bus asks for.
 ///
 /// Assumption: ramps are straight lines; their times are those from 0 Hz to the maximum frequency. The setpoint is cut
@@ -31,7 +41,7 @@ pub(super) fn settings(family: &Family, store: &Store, speed: u16) -> Settings {
     let max = of(roles.max_frequency).unwrap_or(family.max_hertz);
     let from_bus = match &roles.speed_source {
         Some(sources) => all_are(store, sources),
-        None => family.command.is_some() && all_are(store, &roles.obeys),
+        None => family.command.is_some() && obeys(family, store),
     };
     let asked = if from_bus {
         roles.speed.as_ref().map_or(0.0, |role| speed_in_hertz(role, store, speed, max))

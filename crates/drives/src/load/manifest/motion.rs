@@ -175,11 +175,34 @@ pub(in crate::load) struct Control {
     /// Whether setting it does more than make the drive obey, so that `prepare` leaves it to who asks for it by name.
     #[serde(default)]
     pub(in crate::load) by_hand: bool,
+    /// Other values, in counts, with which the words of commands mean what they mean with this one.
+    #[serde(default)]
+    pub(in crate::load) same: Vec<i64>,
+    /// Values with which the words of commands mean something else. Where there is one, the parameter is read before the first command.
+    #[serde(default)]
+    pub(in crate::load) otherwise: Vec<Placed<OtherWords>>,
     /// Whether a document of this very family prints it.
     pub(in crate::load) verified: bool,
     /// What to know about it; where it is not verified, why.
     #[serde(default)]
     pub(in crate::load) note: String,
+    /// Where it is printed: document and page.
+    pub(in crate::load) source: String,
+}
+
+/// A value of a parameter with which the words of commands mean something else.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct OtherWords {
+    /// The value, in counts.
+    pub(in crate::load) value: i64,
+    /// What the words mean then.
+    pub(in crate::load) means: String,
+    /// The word that stops the motor then.
+    pub(in crate::load) stop: Option<u16>,
+    /// The word that lets it coast then; without it, that of `stop`.
+    pub(in crate::load) coast: Option<u16>,
     /// Where it is printed: document and page.
     pub(in crate::load) source: String,
 }

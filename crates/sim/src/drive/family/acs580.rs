@@ -6,7 +6,9 @@
 //! (ACS580 firmware manual 4817085, p. 399). Parameters: 100 × group + index for 16 bits, 20000 + 200 × group + 2 × index for 32, less one.
 //!
 //! - Assumption: a run is obeyed only behind 0476H; any other word takes it back. While it runs, 0476H inhibits operation: it coasts.
-//! - Assumption: other words are out of range. It keeps the ABB drives profile (58.25 is 0 and takes nothing else).
+//! - Assumption: other words are out of range. 58.25 acts at once, and takes values between 0 and 5 that mean nothing.
+//! - With 58.25 = 5, the DCU profile, bit 0 stops and bit 1 starts (ACS580 firmware manual 4817086, p. 413). Assumption: bit 0 wins, with
+//!   bit 9 it coasts, bit 4 resets when it rises (ACS355 manual 4817904, p. 320), and the status word stays what it is.
 //! - Assumption: it obeys the bus while 20.01 is 14, and takes REF1 from it while 28.11 is 8. 46.02 counts tenths of a hertz, 50.0 from
 //!   the factory, which is the highest frequency too. A negative reference reverses.
 //! - Assumption: the status word shows operation enabled until the motor stands. It tells no direction; ACT1 does.
@@ -16,8 +18,8 @@
 //!   watched.
 
 use super::{
-    Deciding, Family, Faults, Handshake, Kind, MAX_WORDS, Measure, Memory, Parameter, Range, Register, Roles, Shows,
-    Speed, SpeedScale, USUAL_DELAY, USUAL_MAX_HZ,
+    Deciding, Family, Faults, Handshake, Kind, MAX_WORDS, Measure, Memory, OtherWords, Parameter, Range, Register,
+    Roles, Shows, Speed, SpeedScale, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::by_the_specification;
@@ -50,6 +52,7 @@ pub(crate) fn acs580() -> Family {
         capped: &[],
         roles: Roles {
             obeys: vec![(COMMAND_SOURCE, 14)],
+            other_words: Some(OtherWords { set_by: (CONTROL_PROFILE, 5), decode: by_dcu }),
             speed_source: Some(vec![(COMMAND_SOURCE, 14), (FREQUENCY_SOURCE, 8)]),
             speed: Some(Speed {
                 register: 1,
@@ -62,6 +65,18 @@ pub(crate) fn acs580() -> Family {
         delay: USUAL_DELAY,
         max_hertz: USUAL_MAX_HZ,
         faults: Faults { overload: Some(9), silent_bus: None },
+    }
+}
+
+/// The DCU profile.
+fn by_dcu(before: u16, word: u16) -> Command {
+    let is_set = |bit: u16| word & 1 << bit != 0;
+    match (is_set(0), is_set(1)) {
+        (true, _) if is_set(9) => Command::Coast,
+        (true, _) => Command::Stop,
+        (false, true) => Command::Run(Direction::Forward),
+        (false, false) if is_set(4) && before & 1 << 4 == 0 => Command::ResetFault,
+        (false, false) => Command::Nothing,
     }
 }
 
@@ -107,6 +122,6 @@ const PARAMETERS: &[Parameter] = &[
     Parameter::new(FREQUENCY_SOURCE, 0, 20, 1).at_standstill(),
     Parameter::new(FREQUENCY_SCALING, 1, 10_000, 500),
     Parameter::new(PROTOCOL, 0, 1, 1),
-    Parameter::new(CONTROL_PROFILE, 0, 0, 0),
+    Parameter::new(CONTROL_PROFILE, 0, 5, 0),
     Parameter::new(REFERENCE_TYPE, 0, 5, 0),
 ];

@@ -11,15 +11,17 @@
 //! - Assumption: bits of CMI other than 1 do nothing. What is stored is there at once, in any state of the motor.
 //! - Assumption: CMD takes these words only; other words are out of range.
 //! - Assumption: a command at 8601, or at 12761, which passes it on to CMD, is obeyed without the words before it.
-//! - Assumption: it obeys the bus while Fr1 is 164 and CHCF is 1, and is at AI1 from the factory: the setpoint is then that of the keypad.
-//!   With CHCF = 3, the I/O profile, it obeys nothing here.
+//! - Assumption: it obeys the bus while Fr1 is 164 and CHCF is 1 or 3, and is at AI1 from the factory: the setpoint is then that of the
+//!   keypad.
+//! - With CHCF = 3, the I/O profile, bit 0 of CMD is the forward command while it is 1 (sheet Registers: CMD, 2-wire, tCC = 2C from the
+//!   factory). Assumption: no other bit has a meaning then, ETA shows what it shows else, and 8601 and 12761 take the same words.
 //! - Assumption: 50.0 Hz is the frequency in FrS, HSP and at the keypad, tFr is 60.0 Hz. LFrd (8602) moves nothing. A negative setpoint
 //!   turns the other way, though rIn is not looked at.
 //! - Assumption: it refuses what is not in the list with 02H. HMIS shows rdY (2) or FLt (23) and nothing else. The current counts tenths.
 
 use super::{
-    Bit, Bounds, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, Parameter, Range, Register, Roles,
-    Scaled, Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
+    Bit, Bounds, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, OtherWords, Parameter, Range,
+    Register, Roles, Scaled, Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::by_the_specification;
@@ -64,6 +66,7 @@ pub(crate) fn atv600() -> Family {
         capped: &[],
         roles: Roles {
             obeys: vec![(CONTROL_MODE, 1), (SETPOINT_SOURCE, MODBUS)],
+            other_words: Some(OtherWords { set_by: (CONTROL_MODE, 3), decode: by_inputs }),
             speed: Some(Speed { register: 8502, unit: None, usual: SPEED }),
             max_frequency: Some(Scaled::tenths(MAX_FREQUENCY)),
             upper_frequency: Some(Scaled::tenths(HIGH_SPEED)),
@@ -82,6 +85,11 @@ pub(crate) fn atv600() -> Family {
         max_hertz: USUAL_MAX_HZ,
         faults: Faults { overload: Some(17), silent_bus: Some(5) },
     }
+}
+
+/// The I/O profile: bit 0 is the run forward.
+fn by_inputs(_: u16, word: u16) -> Command {
+    if word & 0x0001 == 0 { Command::Stop } else { Command::Run(Direction::Forward) }
 }
 
 /// In tenths of a hertz; a negative one turns the other way (assumed).

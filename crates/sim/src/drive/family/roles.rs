@@ -3,6 +3,7 @@
 use drivebus_rtu::huanyang::Protocol;
 
 use super::{Bounds, Handshake};
+use crate::drive::machine::Command;
 
 /// The places at which a family behaves, by address; `None` where it has no such parameter or nobody knows which.
 #[derive(Debug, Clone)]
@@ -43,8 +44,19 @@ pub(crate) struct Roles {
     pub(crate) on_silence: Option<Silence>,
     /// The words that the command register must get before a run. `None`: a run is obeyed at once.
     pub(crate) handshake: Option<Handshake>,
+    /// The other meaning that commands may have.
+    pub(crate) other_words: Option<OtherWords>,
     /// Whether a read may have one parameter and no more.
     pub(crate) reads_single_parameters: bool,
+}
+
+/// A control profile of the drive in which its commands mean something else, and no words come before a run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OtherWords {
+    /// The parameter that decides, and its value for this one.
+    pub(crate) set_by: (u16, u16),
+    /// What a word does then, by the one before it and itself.
+    pub(crate) decode: fn(u16, u16) -> Command,
 }
 
 /// A parameter that holds a quantity.
@@ -186,6 +198,7 @@ impl Roles {
         bus_timeout: None,
         on_silence: None,
         handshake: None,
+        other_words: None,
         reads_single_parameters: false,
     };
 }
