@@ -148,7 +148,7 @@ impl Aim {
         self.with(|look| {
             if look.connection != connection {
                 (look.apart, look.connection) = (self.apart(families, look.is_doubted), connection);
-                (look.has_spoken, look.own_words) = (false, None);
+                (look.has_spoken, look.own_words, look.lost) = (false, None, 0);
             }
         });
     }

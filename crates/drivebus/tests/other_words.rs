@@ -69,11 +69,11 @@ fn order(bus: &Bus, case: &Case) -> Result<(), Error> {
 }
 
 fn check(bus: &Bus, case: &Case) {
-    let came = order(bus, case);
+    let ended = order(bus, case);
     let unit = bus.simulator().unwrap().drive(1).unwrap();
     let taken: Vec<_> = unit.take_writes().into_iter().map(|write| (write.address, write.value)).collect();
-    assert_eq!(taken, case.sent, "{}: {came:?}", case.what);
-    match came {
+    assert_eq!(taken, case.sent, "{}: {ended:?}", case.what);
+    match ended {
         Ok(()) => assert!(!case.sent.is_empty(), "{}", case.what),
         Err(error) => {
             assert!(case.sent.is_empty(), "{}: {error}", case.what);
