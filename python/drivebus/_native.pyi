@@ -670,8 +670,8 @@ class Task:
             `drivebus.line.asking.Write`; `"sleep"` and seconds of the line's clock; `"link"` or `"halts"` and a unit;
             the notice `"took"` and a command that the unit took, `"saw"` and what `Looks.look` comes to, `"shows"` and
             a state, `"took_other"`, a command, the word that the unit took for it, and what is told of
-            `"set_otherwise"` in `Halt.carry_out`, `"stored"`, a code and how often that was written, or `"starts"` and a
-            command that is about to be sent; or `"done"` and the result.
+            `"set_otherwise"` in `Halt.carry_out`, `"stored"`, a code and how often that was written, or `"starts"` and
+            a command that is about to be sent; or `"done"` and the result.
 
         Raises:
             DrivebusError: It failed; an error of the line that it does not handle comes back as it was given.
@@ -737,8 +737,8 @@ class Unit:
     `"not_set"`: `"no_register"`, `"may_not"`; `"not_settled"` as below; `"not_in_hz"` and the unit; `"above"`, a
     parameter and its value; `"not_written"`. `"not_settled"`: `"unproved"` or `"unreadable"` and the variant;
     `"unknown"`, the variant and the raw number. `"not_written"`: `"not_same"` and a result of `SameUnit.check`;
-    `"harm"`, and `"may_be"` and the families that it may be, which may be none, `"set_otherwise"` as of `Halt`, `"busy"`
-    as of `identify`, or `"failed"` and the error of the line; `"failed"` and the error.
+    `"harm"`, and `"may_be"` and the families that it may be, which may be none, `"set_otherwise"` as of `Halt`,
+    `"busy"` as of `identify`, or `"failed"` and the error of the line; `"failed"` and the error.
 
     `"not_reached"`: `"unseen"`; `"untold"` and the role; `"tripped"`, whether the first look showed that, and a status;
     `"late"` and a status.
