@@ -1,11 +1,12 @@
 //! Why nothing may be written to a unit, for Python.
 
-use drivebus_drive::{NotTaken, SetOtherwise};
+use drivebus_drive::NotTaken;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
 use crate::family::names;
 use crate::identify::not_told;
+use crate::set_otherwise::set_otherwise;
 use crate::task::{Failed, unknown};
 
 /// Of which kind the reason is, and what is told of it.
@@ -16,12 +17,4 @@ pub(crate) fn not_taken(py: Python<'_>, error: NotTaken<Failed>) -> PyResult<Py<
         NotTaken::SetOtherwise(otherwise) => ("set_otherwise", set_otherwise(*otherwise)).into_py_any(py),
         error => Err(unknown(&error)),
     }
-}
-
-/// The parameter that gives words another meaning: its code, what it holds and must hold, what that is called, what the words mean
-/// as it is, and a note.
-pub(crate) fn set_otherwise(found: SetOtherwise) -> (String, u16, u16, String, String, String) {
-    let means = found.means().to_owned();
-    let SetOtherwise { wanted, raw, .. } = found;
-    (wanted.code, raw, wanted.raw, wanted.label, means, wanted.note)
 }

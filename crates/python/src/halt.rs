@@ -5,7 +5,6 @@ use drivebus_drive::{self as drive, Besides, Families, NotHalted, Order, Taken, 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 
-use crate::aim::set_otherwise;
 use crate::clock::{duration, to_seconds};
 use crate::errors::refuse;
 use crate::family::{against, names};
@@ -13,6 +12,7 @@ use crate::look::Looks;
 use crate::not_done::{after as after_of, last_look};
 use crate::record::Record;
 use crate::same_unit::SameUnit;
+use crate::set_otherwise::set_otherwise;
 use crate::task::{Failed, Task, is_done, or_why, unknown};
 
 /// One unit that is to be halted; see `python/drivebus/_native.pyi`.

@@ -38,6 +38,7 @@ mod record;
 mod requests;
 mod rule;
 mod same_unit;
+mod set_otherwise;
 mod sheet;
 mod shown_look;
 mod signals;

@@ -13,9 +13,9 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-use crate::aim::set_otherwise;
 use crate::clock::moment;
 use crate::errors::Class;
+use crate::set_otherwise::set_otherwise;
 use crate::shown_look::shown;
 
 /// The `why` of a bus that did not send what was decided on before a halt.
