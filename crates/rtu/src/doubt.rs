@@ -460,7 +460,7 @@ impl Doubts {
 
     /// When whatever is doubted of `unit`, which returns no echo, will be over by itself, if anything is.
     pub(crate) fn ends(&self, now: Instant, unit: UnitAddress) -> Option<Instant> {
-        let asked = self.of(unit).filter(|open| !open.expected.is_echo()).map(|open| open.last + PATIENCE).max();
+        let asked = self.asked_last(unit).map(|asked| asked + PATIENCE);
         let forgotten = self.forgotten.contains(unit).then_some(self.forgotten_until);
         [self.first_contact_ends(now, unit), asked, forgotten].into_iter().flatten().max().filter(|&end| now < end)
     }
@@ -469,10 +469,14 @@ impl Doubts {
         self.strangers.contains(unit) && now < self.strangers_until
     }
 
+    /// When `unit` was last asked what it still owes. An echo can be mistaken for nothing but an echo: it does not count.
+    fn asked_last(&self, unit: UnitAddress) -> Option<Instant> {
+        self.of(unit).filter(|open| !open.expected.is_echo()).map(|open| open.last).max()
+    }
+
     /// Whether `unit` never returned an echo and owes nothing any more.
     fn is_over(&self, now: Instant, unit: UnitAddress) -> bool {
-        // An echo that is still open can be mistaken for nothing but an echo.
-        let asked = self.of(unit).filter(|open| !open.expected.is_echo()).map(|open| open.last).max();
+        let asked = self.asked_last(unit);
         !self.echoers.contains(unit)
             && !self.has_forgotten(now, unit)
             && asked.is_none_or(|asked| now >= asked + PATIENCE)
