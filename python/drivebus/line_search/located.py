@@ -20,7 +20,7 @@ class Located:
         unit: Its address, 1..247.
         identification: What it says that it is; None if no answer of it was whole.
         problem: What was wrong with its answers, if none was whole; that it speaks another protocol; else None.
-        protocol: In what it answered: `"modbus"`, or `"huanyang"`: the maker's own, for which drivebus has no commands.
+        protocol: In what it answered: `"modbus"`, or `"huanyang"`: the maker's own, which `huanyang-hy` speaks.
     """
 
     settings: Settings
