@@ -28,7 +28,7 @@ const SOON: Duration = Duration::from_millis(200);
 /// More messages than this in one input show nothing new.
 const MESSAGES: usize = 16;
 /// How every greeting begins, and the version. A host of another one lets nobody in, which ends each input that greets.
-const GREETING: &[u8] = b"drivebus share \x08";
+const GREETING: &[u8] = b"drivebus share \x09";
 /// The first byte of the answer to a greeting that is of another version, or wants other characters.
 const SENT_AWAY: u8 = 1;
 /// The first byte of a wish that takes back what is under way.

@@ -34,6 +34,7 @@ matched!(
     "MaskWrite { .. }",
     "ReadWrite { .. }",
     "ReadIdentification { .. }",
+    "Huanyang(_)",
     "Custom { .. }"
 );
 matched!(

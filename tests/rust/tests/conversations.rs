@@ -239,8 +239,8 @@ impl Rig {
         }
         // What was taken before a call failed counts for nothing.
         let came = if result.is_ok() { came } else { String::new() };
-        // The settings of a port, which this line has not, are no policy.
-        let result = format!("{result:?}").replace(", set_again: None", "");
+        // The settings of a port, which this line has not, are no policy; nor is the protocol that all units here speak.
+        let result = format!("{result:?}").replace(", set_again: None", "").replace(", protocol: Modbus", "");
         writeln!(text, "{result} {came}").unwrap();
         let stats = self.bus.stats().total;
         writeln!(
