@@ -68,7 +68,11 @@ matched!(Attribution, "drivebus::rtu::Attribution", "Certain", "Repeat { .. }", 
 matched!(Role, "drivebus::rtu::Role", "Request", "Answer", "Late", "Doubtful", "Stray", "Noise(_)");
 taken_apart!(Tally, "drivebus::rtu::Tally", "late, foreign, misfit, noise, noise_idle, own_echo, own_remnant");
 taken_apart!(Patience, "drivebus::rtu::Patience", "pause, usual");
-taken_apart!(CallError, "drivebus::line::CallError", "failure, destination, request, raw, sent, ended, set_again");
+taken_apart!(
+    CallError,
+    "drivebus::line::CallError",
+    "failure, destination, request, protocol, raw, sent, ended, set_again"
+);
 taken_apart!(PortError, "drivebus::line::PortError", "kind, port, message");
 taken_apart!(Overheard, "drivebus::line::Overheard", "at, direction, bytes");
 taken_apart!(Link, "drivebus::line::Link", "good, asked");
