@@ -177,17 +177,10 @@ impl Bus {
             let ask = self.port().ask_as(UnitOptions::default(), destination, request, &options);
             return Err(ask.failed(Failure::Forked, None, None, &[]));
         }
-        let said = match self.port().options.kept_from(request) {
-            Some(failure) => Err(failure),
-            None => self.port().spoken.say(destination, request),
-        };
-        let said = match said {
-            Ok(said) => said,
-            Err(failure) => {
-                let ask = self.port().ask(destination, request, &options);
-                return Err(ask.failed(failure, None, self.port().now_if_known(), &[]));
-            }
-        };
+        if let Some(failure) = self.port().options.kept_from(request) {
+            return Err(self.port().unsent(destination, request, &options, failure));
+        }
+        let said = self.port().said(destination, request, &options)?;
         let mut give_up = || self.is_shut() || give_up();
         let options = spoken::options_for(&said, options);
         let take = &mut |answer: Answer<'_>| spoken::tell(&said, request, answer, take);

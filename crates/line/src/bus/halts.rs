@@ -52,11 +52,7 @@ impl CarriesOut for Shared {
         options: CallOptions,
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Result<(), Box<CallError>> {
-        let ask = self.port.ask(unit.into(), request, &options);
-        let said = match self.port.spoken.say(unit.into(), request) {
-            Ok(said) => said,
-            Err(failure) => return Err(ask.failed(failure, None, self.port.now_if_known(), &[])),
-        };
+        let said = self.port.said(unit.into(), request, &options)?;
         let options = spoken::options_for(&said, options);
         let ask = self.port.ask(unit.into(), &said, &options);
         let take = &mut |answer: Answer<'_>| spoken::tell(&said, request, answer, take);

@@ -18,7 +18,7 @@ use crate::bus::halts_told::HaltsTold;
 use crate::bus::programs::Programs;
 use crate::bus::spoken::Spoken;
 use crate::bus::wills::Wills;
-use crate::error::Failure;
+use crate::error::{CallError, Failure};
 use crate::options::{BusOptions, CallOptions, UnitOptions};
 use crate::owner::Owner;
 use crate::owner::meanings::UnitMeanings;
@@ -209,6 +209,34 @@ impl Port {
             yields: (options.priority != Some(Priority::Stop)).then_some(&*self.queue as &dyn Stops),
             meanings: None,
         }
+    }
+
+    /// `request` as `destination` takes it: in the protocol of its unit.
+    ///
+    /// # Errors
+    ///
+    /// [`Failure::NotSpoken`]: that has nothing for it. Nothing was sent.
+    #[inline]
+    pub(super) fn said<'r>(
+        &self,
+        destination: Destination,
+        request: &Request<'r>,
+        options: &CallOptions,
+    ) -> Result<Request<'r>, Box<CallError>> {
+        let said = self.spoken.say(destination, request);
+        said.map_err(|failure| self.unsent(destination, request, options, failure))
+    }
+
+    /// Why `request` is not sent.
+    #[cold]
+    pub(super) fn unsent(
+        &self,
+        destination: Destination,
+        request: &Request<'_>,
+        options: &CallOptions,
+        failure: Failure,
+    ) -> Box<CallError> {
+        self.ask(destination, request, options).failed(failure, None, self.now_if_known(), &[])
     }
 
     /// A thread that panicked cannot have left them half set.

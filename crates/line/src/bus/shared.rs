@@ -4,7 +4,7 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 use std::sync::Arc;
 use std::time::Duration;
 
-use drivebus_rtu::{Answer, FreshWords, Request};
+use drivebus_rtu::{Answer, FreshWords};
 
 use crate::ask::Done;
 use crate::bus::call::Call;
@@ -96,7 +96,7 @@ impl Shared {
         take: &mut dyn FnMut(Answer<'_>),
     ) -> Option<Result<Done, Box<CallError>>> {
         let request = errand.request(|| self.port.words.next())?;
-        let said = match self.said(errand, &request) {
+        let said = match self.port.said(errand.destination, &request, &errand.options) {
             Ok(said) => said,
             Err(error) => return Some(Err(error)),
         };
@@ -105,14 +105,6 @@ impl Shared {
         let mut call = Call::new(&self.port, ask, options).of_program(errand.program).while_wanted(&*errand.wanted);
         let take = &mut |answer: Answer<'_>| spoken::tell(&said, &request, answer, take);
         Some(call.run_in(turn, &mut || self.port.is_shut(), take))
-    }
-
-    /// `request` of `errand` as its unit takes it.
-    pub(super) fn said<'r>(&self, errand: &Errand, request: &Request<'r>) -> Result<Request<'r>, Box<CallError>> {
-        self.port.spoken.say(errand.destination, request).map_err(|failure| {
-            let ask = self.port.ask(errand.destination, request, &errand.options);
-            ask.failed(failure, None, self.port.now_if_known(), &[])
-        })
     }
 
     /// What people should know about the line, and about who shares it.

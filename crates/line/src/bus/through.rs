@@ -217,7 +217,7 @@ impl Shared {
             drop(turn);
         }
         let request = errand.request(|| self.fresh_word())?;
-        let said = match self.said(errand, &request) {
+        let said = match self.port.said(errand.destination, &request, &errand.options) {
             Ok(said) => said,
             Err(error) => return Some(Err(error)),
         };
