@@ -11,7 +11,7 @@ use super::machine::{Command, Direction, RunState};
 use super::map::{Access, Word};
 use super::places::{spot, table_of};
 use super::refusal::Refusal;
-use super::settings::all_are;
+use super::settings::other_words;
 use super::{Drive, WRITES_KEPT, WriteRecord};
 
 /// The most words that any family takes in one request.
@@ -298,7 +298,7 @@ impl Drive {
 
     /// The other meaning of its commands, where the drive is set to that.
     fn other_words(&self) -> Option<OtherWords> {
-        self.family().roles.other_words.filter(|other| all_are(&self.store, &[other.set_by]))
+        other_words(self.family(), &self.store)
     }
 
     /// What `word` at `address` tells the machine. A run turns the way that another word says, where a family has one, and

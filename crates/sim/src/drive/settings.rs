@@ -1,6 +1,6 @@
 //! What parameters and setpoints ask of the machine.
 
-use super::family::{Family, Scaled, Speed, SpeedUnit, USUAL_MAX_HZ};
+use super::family::{Family, OtherWords, Scaled, Speed, SpeedUnit, USUAL_MAX_HZ};
 use super::machine::Settings;
 use super::store::Store;
 use crate::motor;
@@ -16,13 +16,15 @@ pub(super) fn all_are(store: &Store, parameters: &[(u16, u16)]) -> bool {
     parameters.iter().all(|&(address, value)| store.get(address) == Some(value))
 }
 
+/// The other meaning of commands, where a parameter is set to that.
+pub(super) fn other_words(family: &Family, store: &Store) -> Option<OtherWords> {
+    family.roles.other_words.filter(|other| all_are(store, &[other.set_by]))
+}
+
 /// Whether commands from the bus are obeyed. Where they have another meaning, the parameter that decides it stands at that.
 pub(super) fn obeys(family: &Family, store: &Store) -> bool {
-    let is_set = |&(address, value): &(u16, u16)| {
-        let is_otherwise =
-            family.roles.other_words.is_some_and(|other| other.set_by.0 == address && all_are(store, &[other.set_by]));
-        is_otherwise || all_are(store, &[(address, value)])
-    };
+    let decided_by = other_words(family, store).map(|other| other.set_by.0);
+    let is_set = |&parameter: &(u16, u16)| decided_by == Some(parameter.0) || all_are(store, &[parameter]);
     family.roles.obeys.iter().all(is_set)
 }
 
