@@ -4,11 +4,8 @@
 
 use std::ops::Range;
 
-use drivebus_rtu::huanyang::is_sure;
+use drivebus_rtu::huanyang::{AROUND, is_sure};
 use drivebus_rtu::{UnitAddress, frames_in as modbus_frames_in};
-
-/// What stands around the data of a frame: unit, function, count and CRC.
-const AROUND: usize = 5;
 
 /// The whole frames in `data`, of Modbus or of this protocol, whatever stands between them.
 pub fn frames_in(data: &[u8]) -> Vec<Range<usize>> {

@@ -43,7 +43,7 @@ pub(crate) const SET_FREQUENCY: u8 = 0x05;
 const MOST_WORDS: u16 = 125;
 
 /// What stands around the data of a frame: unit, function, count and CRC.
-const AROUND: usize = 5;
+pub const AROUND: usize = 5;
 
 /// Which protocol a unit speaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
