@@ -14,6 +14,8 @@ import drivebus
 from drivebus import Bus, Drive, NotAllowed, Profile, Simulator, State
 from drivebus.rtu import framed
 
+from .on_the_wire import written
+
 FORWARD, REVERSE, STOP = "05 00 49 FF 00", "05 00 4A FF 00", "05 00 4B FF 00"
 
 
@@ -34,13 +36,6 @@ def drive(bus: Bus) -> Drive:
     drive = bus.drive(1, "h100", unverified=True)
     drive.prepare_control(store=True)
     return drive
-
-
-def written(simulator: Simulator) -> list[str]:
-    """What masters wrote, without unit and CRC."""
-    sent = [frame for _, side, frame in simulator.line.trace() if side == "master"]
-    assert all(framed(frame[:-2]) == frame for frame in sent)
-    return [frame[1:-2].hex(" ").upper() for frame in sent if frame[1] in (0x05, 0x06, 0x0F, 0x10)]
 
 
 def test_a_whole_job(simulator: Simulator, drive: Drive) -> None:

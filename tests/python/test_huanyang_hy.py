@@ -19,6 +19,7 @@ import drivebus
 from drivebus import Bus, Drive, NotAllowed, Profile, Simulator, State, aio
 from drivebus.rtu import framed
 
+from .on_the_wire import asked
 from .postgres_server import until
 
 FORWARD, REVERSE, STOP = "03 01 01", "03 01 11", "03 01 08"
@@ -41,13 +42,6 @@ def drive(bus: Bus) -> Drive:
     drive = bus.drive(1, "huanyang-hy", unverified=True)
     drive.prepare_control(setpoint="frequency", store=True)
     return drive
-
-
-def asked(simulator: Simulator) -> list[str]:
-    """What the drive was asked, without unit and CRC."""
-    sent = [frame for _, side, frame in simulator.line.trace() if side == "master"]
-    assert all(framed(frame[:-2]) == frame for frame in sent)
-    return [frame[1:-2].hex(" ").upper() for frame in sent]
 
 
 def written(simulator: Simulator) -> list[str]:

@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from drivebus import Bus, Drive, NoAnswer, NotAllowed, Simulator, State, Unconfirmed
-from drivebus.rtu import framed
+
+from .on_the_wire import written
 
 RUN = bytes.fromhex("01 05 00 00 FF 00 8C 3A")
 
@@ -33,13 +34,6 @@ def bus(simulator: Simulator) -> Iterator[Bus]:
 @pytest.fixture
 def drive(bus: Bus) -> Drive:
     return bus.drive(1, "wj200", unverified=True)
-
-
-def written(simulator: Simulator) -> list[str]:
-    """What masters wrote, without unit and CRC."""
-    sent = [frame for _, side, frame in simulator.line.trace() if side == "master"]
-    assert all(framed(frame[:-2]) == frame for frame in sent)
-    return [frame[1:-2].hex(" ").upper() for frame in sent if frame[1] in (0x05, 0x06, 0x0F, 0x10)]
 
 
 def test_a_whole_job(simulator: Simulator, drive: Drive) -> None:
