@@ -229,6 +229,12 @@ impl Family {
         place.table == Table::Holding && self.groups.contains(&group)
     }
 
+    /// Whether its units answer at `place` whatever they have there: with 0 where that is nothing.
+    pub(crate) fn answers_with_zero(&self, place: Place) -> bool {
+        let [group, _] = place.address.to_be_bytes();
+        place.table == Table::Holding && self.profile.requests().zeros.contains(&group)
+    }
+
     /// The place and the word of `command`; `None` where it has no such command.
     pub(crate) fn command(&self, command: Command) -> Option<(Place, u16)> {
         self.profile.command(command)

@@ -62,6 +62,7 @@ class RequestRules(_Fact):
         joined: Where it is printed that one 10H request may write several parameters; None where it is not.
         across_groups: Whether a read may leave its group of parameters.
         single_parameters: Whether a read may have one parameter and no more.
+        zeros: The high bytes of addresses under which each is answered, with 0 where there is nothing.
         verified: Whether a document of this very family prints it.
         note: What else is known; says what is assumed where it is not verified.
         source: The document that says so.
@@ -71,6 +72,7 @@ class RequestRules(_Fact):
     joined: str | None
     across_groups: bool
     single_parameters: bool
+    zeros: tuple[int, ...]
     verified: bool
     note: str
     source: str

@@ -154,6 +154,9 @@ pub(super) struct Requests {
     /// Whether a read may have one parameter and no more.
     #[serde(default)]
     pub(super) single_parameters: bool,
+    /// The high bytes of addresses under which a read is answered, with 0 where there is nothing: `[0x00, 0x07]`.
+    #[serde(default)]
+    pub(super) zeros: Vec<u8>,
     /// Whether a document of this very family prints it.
     #[serde(default = "yes")]
     pub(super) verified: bool,

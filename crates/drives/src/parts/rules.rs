@@ -62,6 +62,8 @@ pub struct Requests {
     pub across_groups: bool,
     /// Whether a read may have one parameter and no more; registers are not meant.
     pub single_parameters: bool,
+    /// The high bytes of addresses of holding registers under which each is answered, with 0 where there is nothing.
+    pub zeros: Vec<u8>,
     /// Whether documents of this family print all of this.
     pub verified: bool,
     /// What to know about it; says what is assumed where it is not verified.

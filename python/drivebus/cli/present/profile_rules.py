@@ -99,6 +99,9 @@ def _line(profile: drivebus.Profile) -> list[str]:
         lines.append("no read leaves its group of parameters")
     if requests.single_parameters:
         lines.append("a read has one parameter and no more")
+    if requests.zeros:
+        groups = ", ".join(f"{group:02X}xxH" for group in requests.zeros)
+        lines.append(f"what is not there reads as 0 in {groups}")
     serial = profile.serial()
     if serial is None:
         return [*lines, "its factory setting is not known"]
