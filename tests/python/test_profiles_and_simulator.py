@@ -39,7 +39,7 @@ READ_ONLY = {
     **dict.fromkeys(
         [
             *("ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
-            *("acs580", "atv12", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15"),
+            *("acs580", "atv12", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15", "frenic"),
         ],
         0x02,
     ),
@@ -61,6 +61,7 @@ OUT_OF_RANGE = {
             "md500",
             "fr-d700",
             "vf-s15",
+            "frenic",
         ],
         0x03,
     ),
@@ -68,10 +69,14 @@ OUT_OF_RANGE = {
 }
 """And a value that is out of range, where it is not their 04H."""
 
+NARROWER = {("frenic", "set_frequency")}
+"""What takes a word below zero, by which the motor turns the other way: drivebus sends none."""
+
 WITHOUT = {
     "atv600": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
     "vfd500": {"jog_stop"},
     "md500": {"jog_stop"},
+    "frenic": {"coast", "jog_forward", "jog_reverse", "jog_stop"},
     "fr-d700": {"coast", "reset_fault", "jog_forward", "jog_reverse", "jog_stop"},
     "fc51": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
     "fc202": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
@@ -183,6 +188,8 @@ def test_every_register_has_the_range_that_the_drive_has(bench: Bench) -> None:
         row = bench.profile.describe(name)
         bound = row.low_from or row.high_from or row.variant or row.low is None or row.high is None
         if row.kind != "register" or row.place is None or row.access == "ro" or row.place in commands or bound:
+            continue
+        if (bench.profile.name, name) in NARROWER:
             continue
         low, high = bench.profile.encode(name, row.low), bench.profile.encode(name, row.high)
         for word in (low, high):

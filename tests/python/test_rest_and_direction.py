@@ -111,5 +111,18 @@ def test_a_stop_that_is_ignored_is_believed_or_not_as_the_profile_says(early: Pa
 
 @pytest.mark.parametrize("family", drivebus.profiles())
 def test_where_no_page_says_that_a_ramp_is_told_the_frequency_is_looked_at(family: str) -> None:
-    unsure = ("acs355", "acs580", "atv12", "atv312", "atv600", "fc202", "fr-d700", "h100", "j1000", "vf-s15", "yl620")
+    unsure = (
+        "acs355",
+        "acs580",
+        "atv12",
+        "atv312",
+        "atv600",
+        "fc202",
+        "fr-d700",
+        "frenic",
+        "h100",
+        "j1000",
+        "vf-s15",
+        "yl620",
+    )
     assert Profile.builtin(family).rest_by_frequency() is (family in unsure)

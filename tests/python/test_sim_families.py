@@ -51,6 +51,7 @@ FAMILIES = {
     35: "j1000",
     36: "vf-s15",
     37: "huanyang-hy",
+    38: "frenic",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]

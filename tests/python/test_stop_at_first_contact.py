@@ -22,17 +22,19 @@ QUESTIONS = {
     "fc51": (6, 108),
     "yl620": (4, 75),
     "md500": (5, 90),
-    "fr-d700": (5, 92),
-    # An MD500 has its setpoint where these take their commands, and is asked for 7000H.
-    **dict.fromkeys(("chf100a", "saj8000m"), (7, 120)),
-    "a1000": (6, 105),
+    # These are also asked for 080EH, which a FRENIC has: it answers 0 to what it does not use.
+    "fr-d700": (6, 112),
+    "a1000": (7, 122),
+    "j1000": (8, 140),
+    # And these, and for 7000H: an MD500 has its setpoint where they take their commands.
+    **dict.fromkeys(("chf100a", "saj8000m"), (8, 135)),
     # An Altivar 600 is asked for CHCF, too: in its I/O profile 07H runs it. By the other two names nobody would ask it,
     # so one more word tells that they are none.
     **dict.fromkeys(("atv312", "atv12", "atv600"), (7, 120)),
-    "j1000": (7, 125),
+    "frenic": (6, 105),
     "v20": (8, 140),
     # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there.
-    "acs355": (10, 172),
+    "acs355": (11, 187),
     "acs580": (9, 155),
     # Nothing is asked: what halts it says nothing to a drive of Modbus. The line is silent for 50 ms before.
     "huanyang-hy": (0, 55),

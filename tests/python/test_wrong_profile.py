@@ -61,12 +61,13 @@ SILENT_ON_CODES = [
     "fr-d700",
     "j1000",
     "vf-s15",
+    "frenic",
 ]
 """The families whose units refuse 2103H."""
 
 SIGNED = [
     *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "v20"),
-    *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15"),
+    *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic"),
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -106,6 +107,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "j1000": ["j1000"],
     # And this one FD00H and FD01H.
     "vf-s15": ["vf-s15"],
+    # And this one 080EH and 0809H.
+    "frenic": ["frenic"],
     "eds300": ["eds300"],
     "sunfar-e300": ["sunfar-e300"],
     # And these rFr and CMD: 0C82H and 2135H; this one Otr, 0C85H, and that one HMIS, 0CA8H.

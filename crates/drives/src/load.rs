@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 37] = [
+static BUILTINS: [Builtin; 38] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -177,6 +177,7 @@ static BUILTINS: [Builtin; 37] = [
     builtin!("acs580": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("fc51": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("fc202": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("frenic": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("vf-s15": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("wj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("h100": "registers.csv" "parameters.csv" "faults.csv"),

@@ -212,6 +212,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("eds300", 17),
         ("fc51", 23),
         ("fr-d700", 39),
+        ("frenic", 12),
         ("fc202", 14),
         ("gd10", 81),
         ("gd100", 94),

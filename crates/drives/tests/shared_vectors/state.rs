@@ -93,8 +93,11 @@ fn of_the_shipped_profiles_only_six_words_say_two_things() {
             assert_eq!(profile.state(raw).is_running(), runs, "{name}: {raw:04X}H is {said:?}");
             assert!(
                 said.len() < 2
-                    || ["vfd500", "a1000", "fc51", "fc202", "fr-d700", "v20", "acs355", "acs580", "j1000", "vf-s15"]
-                        .contains(&name),
+                    || [
+                        "vfd500", "a1000", "fc51", "fc202", "fr-d700", "frenic", "v20", "acs355", "acs580", "j1000",
+                        "vf-s15"
+                    ]
+                    .contains(&name),
                 "{name}: {raw:04X}H is {said:?}"
             );
             assert_eq!(profile.is_in_fault(raw), said.contains(&State::Fault), "{name}: {raw:04X}H");

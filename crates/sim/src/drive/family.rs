@@ -20,6 +20,7 @@ mod eds300;
 mod fc202;
 mod fc51;
 mod fr_d700;
+mod frenic;
 mod gd200a;
 mod gd300;
 mod gd3000;
@@ -153,7 +154,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 37] = [
+const FAMILIES: [fn() -> Family; 38] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -189,6 +190,7 @@ const FAMILIES: [fn() -> Family; 37] = [
     fr_d700::fr_d700,
     wj200::wj200,
     vf_s15::vf_s15,
+    frenic::frenic,
     h100::h100,
     huanyang::huanyang,
 ];

@@ -203,6 +203,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "fr-d700",
         "j1000",
         "vf-s15",
+        "frenic",
     ] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }

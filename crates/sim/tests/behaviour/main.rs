@@ -13,6 +13,7 @@ mod ears;
 mod families;
 mod faults;
 mod fc51;
+mod fuji;
 mod goodrives;
 mod inovance;
 mod memory;
