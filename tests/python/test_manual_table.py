@@ -145,7 +145,7 @@ def test_a_range_that_does_not_fit_its_step_is_left_to_the_note(tmp_path: Path) 
 
 def test_names_that_are_alike_are_numbered_in_their_order() -> None:
     rows = "".join(f"{address:04X},Value 2\n" for address in range(3000)) + "F000,Value 2 17\n"
-    names = [row.name for row in ManualTable(f"Address (hex),Name\n{rows}".encode()).rows]
+    names = [row.name for row in ManualTable().read(f"Address (hex),Name\n{rows}".encode(), "p. 1")]
     assert (names[:3], names[2999], names[3000]) == (
         ["value_2", "value_2_2", "value_2_3"],
         "value_2_3000",
@@ -247,7 +247,8 @@ def test_a_source_that_says_nothing_is_none(tmp_path: Path) -> None:
 def test_no_table_brings_it_down(cells: list[list[str]]) -> None:
     text = "Address (hex),Name,Unit,Range,R/W\n" + "\n".join(",".join(row) for row in cells)
     try:
-        table = ManualTable(text.encode("utf-8", "surrogatepass"))
+        table = ManualTable()
+        table.read(text.encode("utf-8", "surrogatepass"), "p. 1")
     except (drivebus.NotAllowed, drivebus.BadArgument):
         return
     places = [(row.table, row.address) for row in table.rows]

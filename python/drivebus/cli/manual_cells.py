@@ -12,6 +12,7 @@ from drivebus.cli.wrong_use import WrongUse
 __all__ = [
     "COUNTS",
     "TableRow",
+    "UnclearAddresses",
     "count_of",
     "is_code",
     "place_of",
@@ -56,6 +57,8 @@ class TableRow:
         default: As it is printed, or empty.
         choices: What the values of a parameter mean.
         notes: What was not taken over.
+        source: Where it is printed: document and page.
+        variant: Which variant of the profile has its unit and scale, or empty.
     """
 
     line: int
@@ -72,6 +75,8 @@ class TableRow:
     default: str = ""
     choices: dict[int, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    source: str = ""
+    variant: str = ""
 
     def without_range(self) -> None:
         """Leaves the range to the note: it does not fit the step."""
@@ -79,11 +84,15 @@ class TableRow:
         self.low = self.high = ""
 
 
+class UnclearAddresses(WrongUse):
+    """The addresses of a table may be hexadecimal or decimal."""
+
+
 def count_of(title: str, cells: Sequence[str]) -> str:
     """How the addresses are written.
 
     Raises:
-        WrongUse: They may be hexadecimal or decimal.
+        UnclearAddresses: They may be hexadecimal or decimal.
     """
     said = [cell.strip().lower() for cell in cells if cell.strip()]
     if "hex" in title.lower() or any(re.fullmatch(_HEX, one) for one in said):
@@ -92,7 +101,7 @@ def count_of(title: str, cells: Sequence[str]) -> str:
         return "decimal"
     if said and all(re.fullmatch(r"[34]\d{4}|[34]0\d{4}", one) for one in said if one.isdigit()):
         return "40001"
-    raise WrongUse(
+    raise UnclearAddresses(
         f"addresses such as {said[0] if said else 'none'} may be hexadecimal or decimal; "
         "the manual says which: give --addresses hex or --addresses decimal"
     )

@@ -1,4 +1,4 @@
-"""A table out of a manual, as rows of a profile: what its columns and cells say, and what could not be read.
+"""Tables out of a manual, as rows of a profile: what their columns and cells say, and what could not be read.
 
 A manual prints addresses, steps and ranges in its own way. What may mean two things is asked for, or left empty with a
 note: a guess would be a value that is wrong by a factor of ten.
@@ -50,38 +50,45 @@ _ACCESS = {
 }
 _ACCESS_OF_PARAMETERS = _ACCESS | {"rw": r"(?!)"}
 """Of a parameter, that it can be written does not tell whether also while the motor turns."""
-_REGISTERS = "address,table,name,label,unit,scale,signed,low,high,high_from,access,verified,note,source"
+_REGISTERS = "address,table,name,label,unit,scale,signed,low,high,high_from,variant,access,verified,note,source"
 _PARAMETERS = (
     "code,address,name,label,unit,scale,signed,low,low_from,high,high_from,default,access,choices,verified,note,source"
 )
 
 
 class ManualTable:
-    """What a table says.
+    """What the tables of a manual say, one after the other.
 
     Attributes:
         rows: What could be read.
-        left_out: The line of each row that could not, and why.
+        left_out: The line of each row of the last table that could not, and why.
     """
 
-    def __init__(self, data: bytes, *, count: str | None = None) -> None:
-        """*data* as a spreadsheet saves it, or pasted; *count* is how its addresses are written, if they do not tell.
+    def __init__(self) -> None:
+        self.rows: list[TableRow] = []
+        self.left_out: list[tuple[int, str]] = []
+        self._places: dict[str, int] = {}
+        self._names: dict[str, int] = {}
+
+    def read(self, data: bytes, source: str, *, count: str | None = None) -> list[TableRow]:
+        """Adds the rows of a table; says which these are.
+
+        *data* is as a spreadsheet saves it, or pasted; *source* is where it is printed; *count* is how its addresses are
+        written, if they do not tell.
 
         Raises:
-            WrongUse: It has no column of addresses or of names, or its addresses may mean two things.
+            WrongUse: It has no column of addresses or of names, or its addresses may mean two things. Nothing was added.
             NotAllowed: It is no such text.
         """
         data = as_sheet(data)
         titles, rows = read_sheet(data, titles_of(data))
         self._places = _columns(titles, by_code=count == "group.index")
-        self._names: dict[str, int] = {}
-        self.rows: list[TableRow] = []
-        self.left_out: list[tuple[int, str]] = []
         cells = [(line, dict(self._cells(row))) for line, row in rows]
         count = count or count_of(titles[self._places["address"]], [row["address"] for _, row in cells])
         by_code = count == "group.index"
         said = "code" if by_code else "address"
-        taken: dict[tuple[str, int], int] = {}
+        taken = {(row.table, row.address): row.name for row in self.rows}
+        self.left_out, before = [], len(self.rows)
         for line, row in cells:
             place = place_of_code(row["code"]) if by_code else place_of(row["address"], count)
             if place is None:
@@ -89,18 +96,25 @@ class ManualTable:
             elif not row["label"]:
                 self.left_out.append((line, "it has no name"))
             elif place in taken:
-                self.left_out.append((line, f"its address is that of line {taken[place]}"))
+                self.left_out.append((line, f"its address is that of {taken[place]}"))
             else:
-                taken[place] = line
-                self.rows.append(self._row(line, place, row))
+                taken[place] = f"line {line}"
+                self.rows.append(self._row(line, place, row, source))
+        return self.rows[before:]
+
+    def add(self, address: int, label: str, source: str) -> TableRow:
+        """Adds a holding register that no table has."""
+        row = TableRow(0, address, "holding", self._name(label), label, source=source)
+        self.rows.append(row)
+        return row
 
     def _cells(self, row: Sequence[str]) -> Iterator[tuple[str, str]]:
         for what, place in self._places.items():
             yield what, " ".join(row[place].split()) if place < len(row) else ""
 
-    def _row(self, line: int, place: tuple[str, int], cells: dict[str, str]) -> TableRow:
+    def _row(self, line: int, place: tuple[str, int], cells: dict[str, str], source: str) -> TableRow:
         table, address = place
-        row = TableRow(line, address, table, self._name(cells["label"]), cells["label"])
+        row = TableRow(line, address, table, self._name(cells["label"]), cells["label"], source=source)
         if table == "holding" and is_code(cells.get("code", "")):
             row.code = cells["code"]
         if row.code and take_choices(row, cells):
@@ -155,20 +169,20 @@ class ManualTable:
             self.rows.remove(row)
             self.left_out.append((row.line, reason))
 
-    def csv(self, source: str) -> dict[str, str]:
-        """The rows as `registers.csv` and `parameters.csv` have them, by *source*: document and page."""
+    def csv(self) -> dict[str, str]:
+        """The rows as `registers.csv` and `parameters.csv` have them."""
         registers, parameters = [_REGISTERS.split(",")], [_PARAMETERS.split(",")]
         for row in self.rows:
             signed = "yes" if row.low.startswith("-") else "no"
             scale = "" if row.scale is None else str(row.scale)
             at = f"0x{row.address:04X}"
             facts = [row.name, row.label, row.unit, scale, signed, row.low]
-            proof = ["yes", "; ".join(row.notes), source]
+            proof = ["yes", "; ".join(row.notes), row.source]
             if row.code:
                 choices = ";".join(f"{number}={label}" for number, label in row.choices.items())
                 parameters.append([row.code, at, *facts, "", row.high, "", row.default, row.access, choices, *proof])
             else:
-                registers.append([at, row.table, *facts, row.high, "", row.access, *proof])
+                registers.append([at, row.table, *facts, row.high, "", row.variant, row.access, *proof])
         return {"registers.csv": _as_text(registers), "parameters.csv": _as_text(parameters)}
 
 

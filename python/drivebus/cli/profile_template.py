@@ -214,8 +214,8 @@ def files(folder: str, *, like: str | None = None, overlay: str | None = None, l
     }
 
 
-def files_of_table(folder: str, table: ManualTable, source: str) -> dict[str, str]:
-    """The files of a new profile in *folder* whose rows are those of *table*, by *source*: document and page.
+def files_of_table(folder: str, table: ManualTable) -> dict[str, str]:
+    """The files of a new profile in *folder* whose rows are those of *table*.
 
     What the loader does not take of a row goes into its note. A row that it does not take at all is left out.
     *table* tells both.
@@ -224,7 +224,7 @@ def files_of_table(folder: str, table: ManualTable, source: str) -> dict[str, st
     if any(row.table == "input" for row in table.rows):
         written["profile.toml"] = written["profile.toml"].replace("functions = [0x03, ", "functions = [0x03, 0x04, ")
     while True:
-        written |= table.csv(source)
+        written |= table.csv()
         with tempfile.TemporaryDirectory(prefix="drivebus-profile-") as place:
             for name, text in written.items():
                 Path(place, name).write_text(text, encoding="utf-8", newline="\n")

@@ -149,11 +149,13 @@ def new(
         drivebus.Profile.builtin(base)
     try:
         name = folder.resolve().name
-        read = None if table is None else ManualTable(_read(table), count=addresses)
-        if read is None or not source:
+        read = None
+        if table is None or not source:
             written = profile_template.files(name, like=like, overlay=overlay)
         else:
-            written = profile_template.files_of_table(name, read, source)
+            read = ManualTable()
+            read.read(_read(table), source, count=addresses)
+            written = profile_template.files_of_table(name, read)
         there = [name for name in written if (folder / name).exists() or (folder / name).is_symlink()]
         if there:
             raise WrongUse(f"{folder} has {', '.join(there)} already; nothing was written")
