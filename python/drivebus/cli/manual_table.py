@@ -73,11 +73,12 @@ class ManualTable:
     def read(self, data: bytes, source: str, *, count: str | None = None) -> list[TableRow]:
         """Adds the rows of a table; says which these are.
 
-        *data* is as a spreadsheet saves it, or pasted; *source* is where it is printed; *count* is how its addresses are
-        written, if they do not tell.
+        *data* is as a spreadsheet saves it, or pasted; *source* is where it is printed; *count* is how its addresses
+        are written, if they do not tell.
 
         Raises:
-            WrongUse: It has no column of addresses or of names, or its addresses may mean two things. Nothing was added.
+            WrongUse: It has no column of addresses or of names, or its addresses may mean two things. No row was
+                added.
             NotAllowed: It is no such text.
         """
         data = as_sheet(data)

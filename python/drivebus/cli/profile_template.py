@@ -11,8 +11,9 @@ from pathlib import Path
 
 import drivebus
 from drivebus.cli.manual_table import ManualTable
+from drivebus.cli.profile_answers import Answers
 
-__all__ = ["family_name", "files", "files_of_table"]
+__all__ = ["NAMES", "family_name", "files", "files_of_answers", "files_of_table"]
 
 _REGISTERS = "address,name,label,unit,scale,signed,words,low,high,high_from,variant,access,verified,note,source\n"
 _PARAMETERS = (
@@ -27,6 +28,9 @@ _EXAMPLE_PARAMETER = (
 _EXAMPLE_FAULT = "1,OC,An example,Why it may have come,What to do about it,assumed,Replace this row.,\n"
 
 _SCHEMA = "profile.schema.json"
+
+NAMES = ("profile.toml", "registers.csv", "parameters.csv", "faults.csv", _SCHEMA)
+"""The files of a profile."""
 
 _HEAD = """\
 #:schema ./{schema}
@@ -223,18 +227,33 @@ def files_of_table(folder: str, table: ManualTable) -> dict[str, str]:
     written = files(folder, listed=bool(table.parameters)) | {"faults.csv": _FAULTS}
     if any(row.table == "input" for row in table.rows):
         written["profile.toml"] = written["profile.toml"].replace("functions = [0x03, ", "functions = [0x03, 0x04, ")
+    return _with_rows(written, table)
+
+
+def files_of_answers(folder: str, answers: Answers) -> dict[str, str]:
+    """The files of a new profile in *folder* that says what was answered.
+
+    Its rows are taken as in `files_of_table`.
+    """
+    rules = answers.rules(folder, family_name(folder)) + "\n"
+    written = {"profile.toml": rules, "faults.csv": _FAULTS, _SCHEMA: drivebus.Profile.schema()}
+    return _with_rows(written, answers.table)
+
+
+def _with_rows(written: dict[str, str], table: ManualTable) -> dict[str, str]:
+    """*written*, and the rows of *table* that the loader takes beside it."""
     while True:
         written |= table.csv()
         with tempfile.TemporaryDirectory(prefix="drivebus-profile-") as place:
             for name, text in written.items():
                 Path(place, name).write_text(text, encoding="utf-8", newline="\n")
             problems = drivebus.Profile.check(place)
-        # The template has no mistake of its own.
+        # A mistake of the rules is no row's; whoever wrote them is told.
         rows = {"registers.csv": table.registers, "parameters.csv": table.parameters}
         wrong = {
             (Path(problem["file"]).name, problem["line"]): problem["reason"]
             for problem in problems
-            if problem["line"] is not None
+            if problem["line"] is not None and Path(problem["file"]).name in rows
         }
         if not wrong:
             return written

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import click
 
 import drivebus
-from drivebus.cli import profile_template
+from drivebus.cli import profile_interview, profile_template
 from drivebus.cli.halts_elsewhere import started_by
 from drivebus.cli.manual_cells import COUNTS
 from drivebus.cli.manual_table import ManualTable
@@ -17,8 +18,9 @@ from drivebus.cli.option_types import Place
 from drivebus.cli.present.families import KINDS, Families, FamilyRules, Mistakes
 from drivebus.cli.present.help_format import Listing
 from drivebus.cli.present.output import remark
+from drivebus.cli.profile_answers import Answers
 from drivebus.cli.row_reads import read_rows
-from drivebus.cli.session import Session, pass_session
+from drivebus.cli.session import Declined, Session, pass_session
 from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["COMMANDS"]
@@ -54,6 +56,10 @@ def check(context: click.Context, session: Session, folder: Path, read: bool) ->
     start a shipped family: that is no mistake, but a drive of that family at this address would run. A profile is
     read, never executed.
     """
+    _check(context, session, folder, read=read)
+
+
+def _check(context: click.Context, session: Session, folder: Path, *, read: bool) -> None:
     problems = drivebus.Profile.check(folder)
     session.out.render(Mistakes(problems))
     if problems:
@@ -123,8 +129,15 @@ def _warn(profile: drivebus.Profile) -> None:
 )
 @click.option("--source", metavar="TEXT", help="Where the table is printed: manual, edition, page.")
 @click.option("--addresses", type=click.Choice(COUNTS), help="How the table writes addresses, where they do not tell.")
+@click.option(
+    "--ask/--no-ask",
+    default=None,
+    help="Ask for all that the manual says. It does so on a terminal, without --like, --overlay and --table.",
+)
 @pass_session
+@click.pass_context
 def new(
+    context: click.Context,
     session: Session,
     folder: Path,
     like: str | None,
@@ -132,37 +145,43 @@ def new(
     table: Path | None,
     source: str | None,
     addresses: str | None,
+    ask: bool | None,
 ) -> None:
-    """Start a profile: write its files, with comments that explain them. Nothing is overwritten.
+    """Start a profile: ask for what the manual says, or write files with comments. Nothing is overwritten.
 
     With --table its rows are those of a manual's table: with a code, parameters, else registers. Each row that could
     not be read is named, with the reason.
+
+    Where it asks, the drive may be there: then it is asked which family it may be, and each row is read once.
+    Nothing is written to it.
     """
     if (like is not None) + (overlay is not None) + (table is not None) > 1:
         raise WrongUse("give one of --like, --overlay and --table: a profile is a copy, an overlay, or new")
     # A row names its source in one line.
     source = None if source is None else " ".join(source.split())
-    if (table is None) != (not source) or (table is None and addresses is not None):
+    is_plain = like is None and overlay is None and table is None
+    asks = ask if ask is not None else is_plain and sys.stdin is not None and sys.stdin.isatty()
+    if asks and (like or overlay):
+        raise WrongUse("--ask begins with the manual alone: give it without --like and --overlay")
+    if (table is None) != (not source) or (table is None and addresses is not None and not asks):
         raise WrongUse("give --table with --source, the manual and its page: each row names where it is printed")
     base = like or overlay
     if base is not None:
         drivebus.Profile.builtin(base)
     try:
         name = folder.resolve().name
+        _check_free(folder)
         read = None
+        if asks:
+            _ask(context, session, folder, lambda: profile_interview.ask(table, source, addresses))
+            return
         if table is None or not source:
             written = profile_template.files(name, like=like, overlay=overlay)
         else:
             read = ManualTable()
             read.read(_read(table), source, count=addresses)
             written = profile_template.files_of_table(name, read)
-        there = [name for name in written if (folder / name).exists() or (folder / name).is_symlink()]
-        if there:
-            raise WrongUse(f"{folder} has {', '.join(there)} already; nothing was written")
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in written.items():
-            with (folder / name).open("x", encoding="utf-8", newline="\n") as file:
-                file.write(text)
+        _write(folder, written)
     except OSError as error:
         raise WrongUse(f"{error.filename or folder}: {error.strerror or error}") from error
     told = {} if read is None else {"rows": len(read.rows), "left_out": [list(each) for each in sorted(read.left_out)]}
@@ -171,6 +190,52 @@ def new(
     if read is not None:
         _tell(session, read)
     session.out.say(f"Fill them in, then: drivebus profiles check {folder}")
+
+
+def _check_free(folder: Path) -> None:
+    there = [name for name in profile_template.NAMES if (folder / name).exists() or (folder / name).is_symlink()]
+    if there:
+        raise WrongUse(f"{folder} has {', '.join(there)} already; nothing was written")
+
+
+def _write(folder: Path, written: dict[str, str]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in written.items():
+        with (folder / name).open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+
+
+def _ask(context: click.Context, session: Session, folder: Path, ask: Callable[[], Answers]) -> None:
+    """Makes a profile of what is answered, checks it, and compares it with the drive if that is there."""
+    try:
+        is_there = session.port is not None and click.confirm(
+            f"Is the drive at {session.port}, {session.called}, now? It is only read", default=True, err=True
+        )
+        if is_there and not _goes_on(session):
+            raise Declined("Cancelled. Nothing was written.")
+        answers = ask()
+    except click.Abort:
+        remark()
+        raise Declined("Cancelled. Nothing was written.") from None
+    written = profile_template.files_of_answers(folder.resolve().name, answers)
+    for line, why in sorted(answers.table.left_out):
+        remark(f"line {line} is left out: {why}")
+    _write(folder, written)
+    session.out.say(f"{folder}: {', '.join(written)}")
+    _check(context, session, folder, read=is_there)
+    session.out.say(f"Try it on a simulated drive: drivebus sim --units 1={folder}")
+
+
+def _goes_on(session: Session) -> bool:
+    """Whether a new profile is wanted, although the drive may be of a family that is known."""
+    with session.bus() as bus:
+        found = bus.identify(session.unit)
+    if not found.candidates:
+        remark(f"{session.called} is of no family that is known: {found.reason}.")
+        return True
+    remark(f"{session.called} may be {found.title or ', '.join(found.candidates)} ({found.certainty}: {found.reason}).")
+    remark(f"Then no profile is needed: --profile {found.candidates[0]}.")
+    return click.confirm("Make a new one?", default=False, err=True)
 
 
 def _read(table: Path) -> bytes:

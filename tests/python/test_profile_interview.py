@@ -1,0 +1,258 @@
+"""`drivebus profiles new` asks: what a manual says becomes a profile that is sound, and what is unclear is asked again.
+
+The manuals are made up; what stands in them is typed here twice, as an answer and as what must come of it.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import drivebus
+from drivebus import Simulator
+from drivebus.cli import cli
+
+from .conftest import NO_PTY
+
+REGISTERS = """\
+Address,Name,Unit,R/W
+1000H,Command,,W
+1001H,Speed setpoint,0.01Hz,R/W
+1100H,State,,R
+1101H,Fault number,,R
+1200H,Output frequency,0.01Hz,R
+1201H,Output current,0.1A,R
+"""
+PARAMETERS = """\
+Code    Address  Name               Range                               Default
+P00.01  0001H    Command source     0: keypad, 1: terminals, 2: bus     0
+P00.03  0003H    Maximum frequency  10.00-400.00                        50.00
+"""
+BY_TABLES = [
+    *("Example Drives EX-1", "EX-1 manual, 3rd edition"),
+    *("registers.csv", "41", "-", *PARAMETERS.splitlines(), ".", "42", ""),
+    *("command", "41", "1", "2", "5", "6", "7", "y"),  # pages are offered again
+    *("speed_setpoint", "1100H", "", "number", "1", "2", "3", "4", "output_frequency", "1101H"),
+    *("P00.01=2", "42", "", "6", "12", "40", "9600 8N1 1", "39"),
+]
+BY_HAND = [
+    *("Example Drives EX-2", "EX-2 manual", ""),
+    *("2000H", "7", "12H", "22h", "0x1", "", "2002H=2", "7", "y"),
+    *("2001H", "7", "0.01 %", "P01.00", "0100H", "8", "0.1 Hz", "5 400", "8"),
+    *("2100H", "9", "bits", "15=1", "1-0=1", "1-0=2", "1-0=0"),
+    *("2103H", "9", "0.1 Hz", "", "", "16", "1", "10", ""),
+]
+
+
+def asked(folder: Path, answers: list[str], *words: str, options: tuple[str, ...] = ()) -> Result:
+    line = [*options, "profiles", "new", str(folder), *(words or ("--ask",))]
+    text = "".join(f"{answer}\n" for answer in answers)
+    done = CliRunner().invoke(cli, line, prog_name="drivebus", input=text, env={"DRIVEBUS_PORT": None})
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exc_info
+    return done
+
+
+@pytest.fixture
+def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "registers.csv").write_text(REGISTERS, encoding="utf-8")
+    return tmp_path / "ex"
+
+
+def test_tables_and_words_become_a_profile(there: Path) -> None:
+    done = asked(there, BY_TABLES)
+    assert done.exit_code == 0, done.output
+    assert "is sound: 6 registers, 2 parameters, 0 faults." in done.stdout
+    profile = drivebus.Profile.load(there)
+    assert profile.title == "Example Drives EX-1"
+    assert profile.commands() == {"run_forward": 1, "run_reverse": 2, "stop": 5, "coast": 6, "reset_fault": 7}
+    assert [(each.code, each.value) for each in profile.control()] == [("P00.01", 2)]
+    assert profile.serial() is not None
+    assert profile.requests().source == "EX-1 manual, 3rd edition, p. 40"
+    rows = {name: profile.describe(name) for name in ("command", "speed_setpoint", "P00.01", "output_current")}
+    assert {name: (row.address, row.unit, row.scale) for name, row in rows.items()} == {
+        "command": (0x1000, "", 1),
+        "speed_setpoint": (0x1001, "Hz", 100),
+        "P00.01": (0x0001, "", 1),
+        "output_current": (0x1201, "A", 10),
+    }
+    assert rows["P00.01"].source == "EX-1 manual, 3rd edition, p. 42"
+
+
+def test_what_no_table_has_is_asked_for(there: Path) -> None:
+    done = asked(there, BY_HAND)
+    assert done.exit_code == 0, done.output
+    profile = drivebus.Profile.load(there)
+    assert profile.commands() == {"run_forward": 0x12, "run_reverse": 0x22, "stop": 1, "reset_fault": 2}
+    assert profile.command("reset_fault") == (0x2002, 2)
+    assert profile.functions == [3, 16]
+    text = (there / "profile.toml").read_text(encoding="utf-8")
+    assert '{ name = "bits_1_0", bits = [1, 0] }' in text
+    assert "counts = 10000" in text
+    row = drivebus.Profile.load(there).describe("P01.00")
+    assert (row.address, row.unit, row.scale) == (0x0100, "Hz", 10)
+
+
+@NO_PTY
+@pytest.mark.parametrize("answers", [BY_TABLES, BY_HAND], ids=["by tables", "by hand"])
+def test_a_motor_turns_by_it_and_stops(there: Path, answers: list[str]) -> None:
+    """A simulated drive that does what the profile says, from the tables to a turning motor."""
+    assert asked(there, answers).exit_code == 0
+    with Simulator({1: there}, transport="process", clock="virtual") as line, drivebus.Bus(line) as bus:
+        drive = bus.drive(1, profile=there)
+        if drive.profile.control():
+            drive.prepare_control(store=True)
+        else:
+            drive.write({"P01.00": 50.0}, store=True)
+        drive.run(10.0)
+        drive.wait_for_speed(10.0)
+        assert line.drive(1).frequency == pytest.approx(10.0, abs=0.1)
+        drive.stop()
+        drive.wait_until_stopped()
+        assert line.drive(1).state == "stopped"
+
+
+@pytest.mark.parametrize(
+    ("place", "wrong", "said"),
+    [
+        (2, "nowhere.csv", "nowhere.csv: No such file"),
+        (3, "1000", "1000H, or 1000 as 0x03E8"),
+        (3, "spindle", '"spindle" is no name of the tables and no address'),
+        (5, "0012", "write 18, 12H or 0x12"),
+        (6, "12h", "12h is run forward already"),
+        (5, "70000", "no word from 0 to 65535"),
+        (9, "here=5", '"here" is no name'),
+        (12, "30005", "which is an input register"),
+        (14, "0.03 Hz", "such as 0.01 Hz"),
+        (15, "P1", '"P1" is no code of a parameter'),
+        (18, "0.1 %", "is no frequency"),
+        (19, "400 10", "no lowest and highest frequency"),
+        (24, "17=1", "a word has the bits 0 to 15"),
+        (24, "1=2", "does not fit"),
+        (24, "running", "is no bit and what it is"),
+        (32, "P00.01", "no parameter and value"),
+        (33, "3", "is not one of"),
+        (34, "0", "is not in the range"),
+        (36, "9600 7E1 1", "no speed, format and unit"),
+        (36, "9600 8N1 248", "no speed, format and unit"),
+    ],
+)
+def test_a_wrong_answer_is_named_and_asked_again(there: Path, place: int, wrong: str, said: str) -> None:
+    """As what was meant follows, the profile is the same."""
+    done = asked(there, [*BY_HAND[:place], wrong, *BY_HAND[place:]])
+    assert done.exit_code == 0, done.output
+    assert said in " ".join(done.stderr.split())
+    other = there.with_name("other") / "ex"
+    other.parent.mkdir()
+    assert asked(other, BY_HAND).exit_code == 0
+    assert (there / "profile.toml").read_bytes() == (other / "profile.toml").read_bytes()
+
+
+def test_where_the_input_ends_nothing_is_written(there: Path) -> None:
+    for count in range(len(BY_TABLES) - 1):
+        done = asked(there, BY_TABLES[:count])
+        assert (done.exit_code, there.exists()) == (2, False), done.output
+        assert "Nothing was written" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--ask", "--like", "gd350"),
+        ("--ask", "--overlay", "gd350"),
+        ("--ask", "--table", "registers.csv"),
+        ("--ask", "--table", "nowhere.csv", "--source", "p. 1"),
+    ],
+)
+def test_what_cannot_be_asked(there: Path, words: tuple[str, ...]) -> None:
+    done = asked(there, BY_TABLES, *words)
+    assert (done.exit_code, there.exists()) == (2, False)
+
+
+def test_files_that_are_there_are_told_before_any_question(there: Path) -> None:
+    there.mkdir()
+    (there / "faults.csv").write_text("mine", encoding="utf-8")
+    done = asked(there, BY_TABLES)
+    assert (done.exit_code, "Maker and series" in done.stderr) == (2, False)
+    assert (there / "faults.csv").read_text(encoding="utf-8") == "mine"
+
+
+ANSWERS = st.sampled_from(
+    [*dict.fromkeys(BY_TABLES + BY_HAND), "", "0", "65535", "-", "n", "P00.01", "0=0", '"', "é\t#"]
+)
+
+
+@given(
+    st.sampled_from([BY_TABLES, BY_HAND]), st.lists(st.tuples(st.integers(0, 40), ANSWERS, st.booleans()), max_size=6)
+)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_whatever_is_answered_what_is_written_is_sound(
+    there: Path, meant: list[str], slips: list[tuple[int, str, bool]]
+) -> None:
+    """Answers in the wrong place, or one too many; then Enter for what is asked after them."""
+    folder = there.with_name("made")
+    for file in folder.glob("*"):
+        file.unlink()
+    answers = [*meant, *[""] * 40]
+    for place, slip, is_added in slips:
+        answers[place : place + (not is_added)] = [slip]
+    done = asked(folder, answers)
+    if done.exit_code == 0:
+        assert drivebus.Profile.check(folder) == []
+    else:
+        assert (done.exit_code, [*folder.glob("*")]) == (2, []), done.output
+
+
+class TestWithTheDriveThere:
+    def test_a_family_that_is_known_needs_no_profile(self, there: Path) -> None:
+        done = asked(there, ["y", "n"], options=("--port", "sim://gd350?clock=virtual"))
+        assert (done.exit_code, there.exists()) == (2, False)
+        assert "no profile is needed: --profile gd350" in " ".join(done.stderr.split())
+
+    @NO_PTY
+    def test_each_row_is_read_and_nothing_is_written(self, there: Path) -> None:
+        assert asked(there, BY_TABLES).exit_code == 0
+        again = there.with_name("again")
+        with Simulator({1: there}, transport="pty") as line:
+            done = asked(again, ["y", *BY_TABLES], options=("--port", line.port))
+            assert done.exit_code == 0, done.output
+            assert "output_current" in done.stdout
+            assert not line.drive(1).writes()
+
+    @NO_PTY
+    def test_what_the_drive_refuses_is_named(self, there: Path) -> None:
+        assert asked(there, BY_TABLES).exit_code == 0
+        again = there.with_name("again")
+        off = ["1202H" if answer == "output_frequency" else answer for answer in BY_TABLES]
+        place = off.index("1202H") + 1
+        off[place:place] = ["41", "0.01 Hz"]
+        with Simulator({1: there}, transport="pty") as line:
+            done = asked(again, ["y", *off], options=("--port", line.port))
+        assert (done.exit_code, "unit 1 refuses output_frequency_2" in done.stderr) == (4, True), done.output
+        assert drivebus.Profile.check(again) == []
+
+
+@NO_PTY
+def test_it_asks_on_a_terminal_and_nowhere_else(there: Path) -> None:
+    import pty
+
+    words = [sys.executable, "-m", "drivebus", "profiles", "new"]
+    done = subprocess.run([*words, "plain"], stdin=subprocess.DEVNULL, capture_output=True, timeout=60, check=True)
+    assert b"Fill them in" in done.stdout
+    leader, follower = pty.openpty()
+    with subprocess.Popen([*words, "asked"], stdin=follower, stdout=follower, stderr=follower) as program:
+        os.close(follower)
+        os.write(leader, "".join(f"{answer}\n" for answer in BY_TABLES).encode())
+        said = b""
+        while b"Try it on a simulated drive" not in said:
+            said += os.read(leader, 1000)
+        assert program.wait(60) == 0
+    os.close(leader)
+    assert drivebus.Profile.load(there.with_name("asked")).commands()["stop"] == 5
