@@ -181,12 +181,13 @@ fn a_poll_goes_on_when_the_port_changes_hands() {
     let poll =
         Poll::start(Arc::clone(&guest), vec![PollTarget::new(unit(1), vec![(IDENTIFICATION, 1)])], None, 100).unwrap();
     poll.wait(5, None, &mut || false).unwrap();
-    assert_eq!(guest.reconnects(), 0);
+    let before = guest.reconnects();
     owner.close();
     let mut after = 0;
     while after < 5 {
         poll.wait(1, None, &mut || false).unwrap();
-        after += poll.take(10).iter().filter(|(sample, _)| sample.missing.is_none() && guest.reconnects() >= 1).count();
+        after +=
+            poll.take(10).iter().filter(|(sample, _)| sample.missing.is_none() && guest.reconnects() > before).count();
     }
     assert_eq!(identify(&open(&served)).unwrap(), [GD350]);
 }
