@@ -371,6 +371,8 @@ impl Own<'_> {
                 (true, "Hz") => measured(Measure::Frequency),
                 (true, "rpm") => measured(Measure::Speed),
                 (false, "Hz") => measured(Measure::Setpoint),
+                // A share of a frequency that is read back where it is written.
+                (false, _) if entry.access() != ProfileAccess::Ro => Shows::Written,
                 _ => Shows::Zero,
             }
         } else if entry.access() != ProfileAccess::Ro {
