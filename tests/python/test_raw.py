@@ -175,6 +175,13 @@ def test_read_only_and_options_that_do_not_fit_send_nothing(
     assert line.line.requests == 0
 
 
+def test_a_request_for_another_unit_than_the_one_that_is_named_is_not_sent(line: drivebus.Simulator) -> None:
+    done = run("-u", "7", "raw", "01 06 2000 0005", "--yes", port=line.port)
+    assert (done.exit_code, "the request is for unit 1, its first byte, and --unit says 7" in done.stderr) == (2, True)
+    assert not line.drive(1).writes()
+    assert run("-u", "1", "raw", "01 03 2100 0001", port=line.port).exit_code == 0
+
+
 def test_repetitions_begin_when_they_are_said_to() -> None:
     with (
         drivebus.Simulator({1: "gd350"}, transport="process", clock="virtual") as simulator,

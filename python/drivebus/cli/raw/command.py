@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import click
+from click.core import ParameterSource
 
 import drivebus
 from drivebus.cli.option_types import Place, Seconds, Whole
@@ -62,6 +63,7 @@ def raw(
         raise WrongUse("--interval is the time from one of --count times to the next; give --count too")
     if data:
         request = request_of(data, force, session.addresses)
+        _check_unit(session, request.unit)
         if not request.only_looks:
             replace(session, unit=request.unit).will_write()
         with session.bus(read_only=session.read_only) as bus:
@@ -89,6 +91,15 @@ def raw(
             keep_going,
             force,
             yes,
+        )
+
+
+def _check_unit(session: Session, asked: int) -> None:
+    """That a request goes to the unit that was named, if one was."""
+    given = click.get_current_context().find_root().get_parameter_source("units")
+    if given is ParameterSource.COMMANDLINE and asked != session.unit:
+        raise WrongUse(
+            f"the request is for unit {asked}, its first byte, and --unit says {session.unit}; nothing was sent"
         )
 
 
