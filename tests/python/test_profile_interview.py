@@ -40,14 +40,14 @@ BY_TABLES = [
     *("registers.csv", "41", "-", *PARAMETERS.splitlines(), ".", "42", ""),
     *("command", "41", "1", "2", "5", "6", "7", "y"),  # pages are offered again
     *("speed_setpoint", "1100H", "", "number", "1", "2", "3", "4", "output_frequency", "1101H"),
-    *("P00.01=2", "42", "", "6", "12", "40", "9600 8N1 1", "39"),
+    *("P00.01=2", "42", "", "y", "6", "12", "40", "9600 8N1 1", "39"),
 ]
 BY_HAND = [
     *("Example Drives EX-2", "EX-2 manual", ""),
     *("2000H", "7", "12H", "22h", "0x1", "", "2002H=2", "7", "y"),
     *("2001H", "7", "0.01 %", "P01.00", "0100H", "8", "0.1 Hz", "5 400", "8"),
     *("2100H", "9", "bits", "15=1", "1-0=1", "1-0=2", "1-0=0"),
-    *("2103H", "9", "0.1 Hz", "", "", "16", "1", "10", ""),
+    *("2103H", "9", "0.1 Hz", "", "", "n", "16", "1", "10", ""),
 ]
 
 
@@ -131,17 +131,20 @@ def test_a_motor_turns_by_it_and_stops(there: Path, answers: list[str]) -> None:
         (9, "here=5", '"here" is no name'),
         (12, "30005", "which is an input register"),
         (14, "0.03 Hz", "such as 0.01 Hz"),
-        (15, "P1", '"P1" is no code of a parameter'),
-        (18, "0.1 %", "is no frequency"),
+        (14, "0.0003 %", "no 1 to 65535 counts"),
+        (12, "2000H", "2000H is the register of another answer"),
+        (21, "2001H", "2001H is the register of another answer"),
+        (15, "P/1", '"P/1" is no code of a parameter'),
+        (18, "0.1 %", '"0.1 %" is no 1, 0.1, 0.01'),
         (19, "400 10", "no lowest and highest frequency"),
         (24, "17=1", "a word has the bits 0 to 15"),
         (24, "1=2", "does not fit"),
         (24, "running", "is no bit and what it is"),
         (32, "P00.01", "no parameter and value"),
-        (33, "3", "is not one of"),
-        (34, "0", "is not in the range"),
-        (36, "9600 7E1 1", "no speed, format and unit"),
-        (36, "9600 8N1 248", "no speed, format and unit"),
+        (34, "3", "is not one of"),
+        (35, "0", "is not in the range"),
+        (37, "9600 7E1 1", "no speed, format and unit"),
+        (37, "9600 8N1 248", "no speed, format and unit"),
     ],
 )
 def test_a_wrong_answer_is_named_and_asked_again(there: Path, place: int, wrong: str, said: str) -> None:
@@ -256,3 +259,38 @@ def test_it_asks_on_a_terminal_and_nowhere_else(there: Path) -> None:
         assert program.wait(60) == 0
     os.close(leader)
     assert drivebus.Profile.load(there.with_name("asked")).commands()["stop"] == 5
+
+
+def test_what_a_manual_prints_is_taken_as_it_is_printed(there: Path) -> None:
+    """Codes with a letter and a dash, numbers of registers, a whole that is a parameter, bits as digits."""
+    table = """\
+Code  Register  Name               Range                                              Factory
+C-02  40771     Command source     0: panel, 1: terminals, 3: serial                  0
+C-03  40772     Speed source       0: panel, 4: serial                                0
+C-10  40779     Maximum frequency  20.0-200.0 Hz (0.1 Hz)                             60.0
+C-21  40790     Deceleration time  0.1-600.0 s (0.1 s)                                5.0
+"""
+    answers = [
+        *("Norvik NV7", "NV7 manual, 4th edition", "-", *table.splitlines(), ".", "90", ""),
+        *("40513", "89", "0041H", "0042H", "0040H", "0080H", "40515=00A5H", "89", "y"),
+        *("40514", "89", "20000 = C-10", "89"),
+        *("40545", "89", "bits", "7=1", "3-2=01", "3-2=10", "3-2=00"),
+        *("40546", "89", "0.1 Hz", "40549", "89"),
+        *("C-02=3", "90", "speed_source=4", "90", "", "y", "6", "4", "88", "19200 8E1 7", "88"),
+    ]
+    done = asked(there, answers)
+    assert done.exit_code == 0, done.output
+    assert "Parameters: C-02 at 0302H, C-03 at 0303H, C-10 at 030AH, C-21 at 0315H." in done.stderr
+    profile = drivebus.Profile.load(there)
+    assert [(each.code, each.value) for each in profile.control()] == [("C-02", 3), ("C-03", 4)]
+    row = profile.describe("C-10")
+    assert (row.unit, row.scale, row.low, row.high, row.access) == ("Hz", 10, 20.0, 200.0, "stop")
+    with Simulator({7: there}, transport="process", clock="virtual") as line, drivebus.Bus(line) as bus:
+        drive = bus.drive(7, profile=there)
+        drive.prepare_control(store=True)
+        drive.write({"C-10": 60.0}, store=True)
+        drive.run(12.5)
+        # 20000 are 60 Hz.
+        assert line.drive(7).writes()[-1][1:] == (0x0200, 0x0041)
+        assert bus.read(7, 0x0201, 1) == [4167]
+        drive.stop()

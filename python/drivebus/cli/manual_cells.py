@@ -29,12 +29,16 @@ parameter alone, of which P05.06 is at 0506H."""
 _UNIT = r"Hz|kHz|A|V|%|rpm|r/min|kW|W|ms|s|min|h|°C|℃|kWh|N·?m"
 _STEP = re.compile(rf"(?:unit:? ?)?(?P<step>\d+(?:\.\d+)?)? ?(?P<unit>{_UNIT})?")
 _NUMBER = r"[-+]?\d+(?:\.\d+)?"
-_RANGE = re.compile(rf"({_NUMBER}) ?(?:{_UNIT})? ?(?:-|\u2013|~|to|\u2026|\.\.\.?) ?({_NUMBER}) ?(?:{_UNIT})?")
+_RANGE = re.compile(
+    rf"(?P<low>{_NUMBER}) ?(?:{_UNIT})? ?(?:-|\u2013|~|to|\u2026|\.\.\.?) ?(?P<high>{_NUMBER}) ?(?P<unit>{_UNIT})?"
+    rf"(?: ?[(\[](?:step:? ?)?(?P<step>\d+(?:\.\d+)?) ?(?P<of>{_UNIT})?[)\]])?"
+)
+"""`0.1-600.0 s (0.1 s)`: ends, unit and step."""
 _HEX = r"0x[0-9a-f]+|[0-9a-f]{1,4}h|(?=.*[a-f])[0-9a-f]{1,4}"
 """What is in hexadecimal beyond doubt."""
 _SCALES = (1, 10, 100, 1000, 10000)
-_CODE = re.compile(r"[A-Z]{0,3}\.?\d{1,3}[.-]\d{1,3}|[A-Z]{1,3}\.? ?\d{2,4}|[a-z][A-Za-z0-9]{2,3}")
-"""P05.06, F0-01, 02-00, C014, Pr.117, tFr: how makers call parameters. A number alone may be that of the row."""
+_CODE = re.compile(r"[A-Z]{0,3}\.?\d{1,3}[.-]\d{1,3}|[A-Z]{1,3}-\d{1,4}|[A-Z]{1,3}\.? ?\d{2,4}|[a-z][A-Za-z0-9]{2,3}")
+"""P05.06, F0-01, 02-00, C-02, C014, Pr.117, tFr: how makers call parameters. A number alone may be that of the row."""
 _MARK = re.compile(r"(?<![\w.+-])(\d{1,3}) ?[:=\uff1a] ?")
 """The number before what it means: `0: keypad`, `2=bus`."""
 
@@ -134,19 +138,29 @@ def take_step(row: TableRow, cells: dict[str, str]) -> None:
         if found is None:
             row.notes.append(f"the table says {said!r}" if what == "says" else f"the table has {said!r} as its {what}")
             continue
-        row.unit = row.unit or (found["unit"] or "").replace("r/min", "rpm").replace("℃", "°C")
+        row.unit = row.unit or _unit(found["unit"])
         if found["step"]:
             number = Fraction(found["step"])
             # Counts in one unit, where it is more than one and the column does not call it a step.
             step = 1 / number if what == "scale" and number > 1 else number
+    between = _RANGE.fullmatch(_plain(cells.get("range", "")))
+    if between is not None:
+        row.unit = row.unit or _unit(between["of"] or between["unit"])
+        step = Fraction(between["step"]) if step is None and between["step"] else step
     if step is None:
-        # Where no column has a step or a unit, nothing says that there is none.
+        # Where no column has a step or a unit, nothing says that there is none. A value with decimals has one.
         is_told = any(cells.get(what) is not None for what in ("unit", "step", "scale"))
-        row.scale = 1 if is_told and not row.unit and not row.notes and not cells.get("unit") else None
+        has_decimals = any(re.search(r"\d[.,]\d", cells.get(what, "")) for what in ("range", "low", "high", "default"))
+        is_plain = not row.unit and not row.notes and not cells.get("unit") and not has_decimals
+        row.scale = 1 if is_told and is_plain else None
     elif step and 1 / step in _SCALES:
         row.scale = int(1 / step)
     else:
         row.notes.append(f"the table has steps of {float(step):g}")
+
+
+def _unit(said: str | None) -> str:
+    return (said or "").replace("r/min", "rpm").replace("℃", "°C")
 
 
 def take_range(row: TableRow, cells: dict[str, str]) -> None:
@@ -155,7 +169,7 @@ def take_range(row: TableRow, cells: dict[str, str]) -> None:
     said = _plain(cells.get("range", "")) or f"{low}-{high}".strip("-")
     found = _RANGE.fullmatch(said)
     if found is not None and row.scale is not None:
-        row.low, row.high = found[1], found[2]
+        row.low, row.high = found["low"], found["high"]
     elif said:
         row.notes.append(f"the table has the range {said}")
 

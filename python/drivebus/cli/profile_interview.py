@@ -15,7 +15,7 @@ from typing import TypeVar
 import click
 
 import drivebus
-from drivebus.cli.manual_cells import COUNTS, TableRow, UnclearAddresses, is_code, place_of
+from drivebus.cli.manual_cells import COUNTS, TableRow, UnclearAddresses, place_of
 from drivebus.cli.manual_table import ManualTable
 from drivebus.cli.present.output import remark
 from drivebus.cli.profile_answers import Answers, Bits, Commands, Setting, Share, State
@@ -26,7 +26,7 @@ __all__ = ["ask"]
 T = TypeVar("T")
 
 _COMMANDS = {
-    "run_forward": "Word that runs the motor forward",
+    "run_forward": "Word that runs the motor forward (clockwise; look which way it turns)",
     "run_reverse": "Word that runs it in reverse",
     "stop": "Word that stops it along its ramp",
     "coast": "Word that lets it coast",
@@ -41,6 +41,7 @@ _STATES = {
 }
 _BY_BITS = ("fault", "forward", "reverse", "running", "stopped")
 """Of those that fit, the first counts, where none is a running motor."""
+_ADDRESS = r"0x[0-9a-f]{1,4}|[0-9a-f]{1,4}h|[34]\d{4,5}"
 _SCALES = (1, 10, 100, 1000, 10000)
 
 
@@ -70,6 +71,7 @@ class _Interview:
         self.table = ManualTable()
         self._manual = manual
         self._page = ""
+        self._used: list[TableRow] = []
 
     def take_tables(self, count: str | None) -> None:
         """Tables of the manual, until there are no more."""
@@ -89,7 +91,12 @@ class _Interview:
             rows = self.table.read(data, source, count=count)
         for line, why in sorted(self.table.left_out):
             remark(f"line {line} is left out: {why}")
-        remark(f"{len(rows)} rows: {', '.join(row.code or row.name for row in rows)}")
+        for row in rows:
+            if row.notes:
+                remark(f"line {row.line}, {row.code or row.name}: {'; '.join(row.notes)}")
+        for kind, found in (("Registers", [row for row in rows if not row.code]), ("Parameters", [*_coded(rows)])):
+            if found:
+                remark(f"{kind}: {', '.join(f'{row.code or row.name} at {row.address:04X}H' for row in found)}.")
 
     def fill(self, answers: Answers) -> None:
         """Asks for all that makes the drive known by name."""
@@ -108,6 +115,10 @@ class _Interview:
         if answers.fault is not None and answers.fault.scale is None:
             answers.fault.scale = 1
         answers.control.extend(self._control())
+        if any(row.access == "unknown" for row in self.table.parameters):
+            only_at_rest = click.confirm("Are parameters written only while the motor stands?", default=True, err=True)
+            for row in self.table.parameters:
+                row.access = "stop" if only_at_rest and row.access == "unknown" else row.access
         answers.writes = int(
             click.prompt("Function that writes a word", default="6", type=click.Choice(["6", "16"]), err=True)
         )
@@ -166,24 +177,25 @@ class _Interview:
         _allow(row, "rw")
         if row.unit == "Hz" and row.scale is not None:
             return None
-        said = _optional("One count of it is, such as 0.01 Hz, or 0.01 % of a frequency", _step)
+        said = _optional("One count of it is, such as 0.01 Hz; or counts that are a frequency, 10000 = P00.03", _speed)
         row.scale = None
         if said is None:
             return None
-        step, unit = said
-        if unit == "Hz":
-            row.unit, row.scale = "Hz", int(1 / step)
+        if isinstance(said, Fraction):
+            row.unit, row.scale = "Hz", int(1 / said)
             return None
-        code = _needed("100 % is the parameter with the code, such as P00.03", self._parameter)
+        counts, of = said
+        code = self._parameter(of) if of else _needed("100 % is the parameter, such as P00.03", self._parameter)
         if code.scale is None or code.unit != "Hz":
             code.unit, code.scale = "Hz", int(1 / _needed("One count of it is, such as 0.01 Hz", _hertz))
-        low, high = _needed("It may be from and to, in Hz, such as 10 400", _two_numbers)
-        if not (code.low or code.high):
+        if not (code.low and code.high):
+            low, high = _needed(f"{code.code} may be from and to, in Hz, such as 10 400", _two_numbers)
             code.low, code.high = f"{low:g}", f"{high:g}"
+        low, high = float(code.low), float(code.high)
         if row.low or row.high:
             row.without_range()
         row.unit, row.variant = "", "of_speed"
-        return Share(code.code, int(100 / step), low, high, self._source())
+        return Share(code.code, counts, low, high, self._source())
 
     def _is_in_hertz(self, row: TableRow) -> bool:
         if row.unit != "Hz" or row.scale is None:
@@ -192,12 +204,12 @@ class _Interview:
         return row.unit == "Hz" and row.scale is not None
 
     def _control(self) -> Iterator[Setting]:
-        question = "Parameter that gives the bus its say, such as P00.01=2, in this order (Enter: no more)"
+        question = "Parameter that must be set so that the bus gives commands, or the speed: P00.01=2 (Enter: no more)"
         while (found := _optional(question, self._setting)) is not None:
             row, value = found
             if row.scale is None:
                 row.scale = 1
-            yield Setting(row.code, value, self._source())
+            yield Setting(row.code, value, self._source_of(row))
 
     def _setting(self, text: str) -> tuple[TableRow, int]:
         code, equals, value = text.partition("=")
@@ -206,25 +218,39 @@ class _Interview:
         return self._parameter(code.strip()), _word(value.strip())
 
     def _parameter(self, text: str) -> TableRow:
-        row = next((row for row in self.table.parameters if row.code.lower() == text.lower()), None)
+        """A parameter by its code, or by the name or the address of its row."""
+        called = text.lower()
+        row = next((row for row in self.table.rows if called in {row.code.lower() or None, row.name}), None)
+        if row is None and re.fullmatch(_ADDRESS, called):
+            row = self._at(_place(text)[1])
+            if row is None:
+                raise WrongUse(f"no table has {text}; say its code, as the keypad shows it")
         if row is not None:
+            row.code = row.code or _needed(f"The code of {row.name}, as the keypad shows it", _code)
             return row
-        if not is_code(text):
-            raise WrongUse(f'"{text}" is no code of a parameter, such as P00.03 or F0-10')
-        table, address = _needed(f"No table has {text}. Its address on the bus", _place)
-        if table != "holding":
-            raise WrongUse(f"{text} is no holding register there")
-        row = self._at(address) or self.table.add(address, text, self._source())
-        row.code = text
+        code = _code(text)
+        found = _optional(f"No table has {code}. Its address on the bus (Enter: another code)", _place)
+        if found is None or found[0] != "holding":
+            raise WrongUse(f"{code} needs the address of a holding register")
+        row = self._at(found[1]) or self.table.add(found[1], code, self._source())
+        row.code = row.code or code
         return row
 
     def _register(self, question: str, label: str, *, access: str) -> TableRow | None:
         """The row that is named by its name or address; one that no table has is made."""
-        found = _optional(f"{question}: name or address, such as 2000H", self._known_or_place)
+        found = _optional(f"{question}: name or address, such as 2000H", self._free)
         if isinstance(found, int):
             found = self.table.add(found, label, self._source())
+        if found is not None:
+            self._used.append(found)
         if found is not None and found.access == "unknown":
             found.access = access
+        return found
+
+    def _free(self, text: str) -> TableRow | int:
+        found = self._known_or_place(text)
+        if any(found is row for row in self._used):
+            raise WrongUse(f"{text} is the register of another answer")
         return found
 
     def _known_or_place(self, text: str) -> TableRow | int:
@@ -258,11 +284,15 @@ class _Interview:
 
     def _source_of(self, row: TableRow) -> str:
         """Where the words of a register are printed; one that no table has was just asked for its page."""
-        return self._source() if row.line else row.source
+        if not row.line:
+            return row.source
+        if row.source.startswith(f"{self._manual}, "):
+            self._page = row.source.removeprefix(f"{self._manual}, ").removeprefix("p. ")
+        return self._source("Page that says what its words mean")
 
-    def _source(self) -> str:
+    def _source(self, question: str = "Its page") -> str:
         """Document and page; the page before is offered."""
-        page = click.prompt("Its page", default=self._page or None, err=True)
+        page = click.prompt(question, default=self._page or None, err=True)
         self._page = " ".join(str(page).split())
         return f"{self._manual}, {f'p. {self._page}' if self._page.isdecimal() else self._page}"
 
@@ -290,6 +320,16 @@ def _optional(question: str, read: Callable[[str], T]) -> T | None:
 
     answer: T | None = click.prompt(question, default="", show_default=False, value_proc=taken, err=True)
     return answer
+
+
+def _coded(rows: Iterable[TableRow]) -> Iterator[TableRow]:
+    return (row for row in rows if row.code)
+
+
+def _code(text: str) -> str:
+    if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,15}", text) is None:
+        raise WrongUse(f'"{text}" is no code of a parameter, such as P00.03 or F0-10')
+    return text
 
 
 def _text(text: str) -> str:
@@ -356,30 +396,41 @@ def _bits(text: str) -> Bits:
     """Fields of a word and their values, `0=1, 4-3=2`."""
     found: dict[tuple[int, int], int] = {}
     for part in filter(None, re.split(r"[, ]+", text)):
-        said = re.fullmatch(r"(?:bit)?(\d{1,2})(?:-(\d{1,2}))?=(\d{1,5})", part.lower())
+        said = re.fullmatch(r"(?:bit)?(\d{1,2})(?:-(\d{1,2}))?=(\d{1,16})", part.lower())
         if said is None:
             raise WrongUse(f'"{part}" is no bit and what it is, such as 0=1, or 4-3=2 for two of them')
         ends = sorted((int(said[1]), int(said[2] or said[1])), reverse=True)
-        if ends[0] > 15 or int(said[3]) >> (ends[0] - ends[1] + 1):
+        width = ends[0] - ends[1] + 1
+        # As many digits of 0 and 1 as there are bits are these bits: in decimal they would not fit.
+        is_binary = len(said[3]) == width and set(said[3]) <= {"0", "1"}
+        value = int(said[3], 2 if is_binary else 10)
+        if ends[0] > 15 or value >> width:
             raise WrongUse(f'"{part}": a word has the bits 0 to 15, and {said[3]} does not fit in that')
-        found[ends[0], ends[1]] = int(said[3])
+        found[ends[0], ends[1]] = value
     return found
 
 
-def _step(text: str) -> tuple[Fraction, str]:
-    """What one count is."""
-    said = re.fullmatch(r"(\d*[.,]?\d+) ?(hz|%)", text.lower())
-    step = Fraction(said[1].replace(",", ".")) if said else Fraction(0)
-    if said is None or not step or 1 / step not in _SCALES:
-        raise WrongUse(f'"{text}" is no 1, 0.1, 0.01 or 0.001 Hz or %, such as 0.01 Hz')
-    return step, "Hz" if said[2] == "hz" else "%"
-
-
 def _hertz(text: str) -> Fraction:
-    step, unit = _step(text)
-    if unit != "Hz":
-        raise WrongUse(f'"{text}" is no frequency, such as 0.01 Hz')
+    """What one count is."""
+    said = re.fullmatch(r"(\d*[.,]?\d+) ?hz", text.lower())
+    step = Fraction(said[1].replace(",", ".")) if said else Fraction(0)
+    if not step or 1 / step not in _SCALES:
+        raise WrongUse(f'"{text}" is no 1, 0.1, 0.01 or 0.001 Hz, such as 0.01 Hz')
     return step
+
+
+def _speed(text: str) -> Fraction | tuple[int, str]:
+    """What one count is; or how many counts are a parameter, by its code, which may follow."""
+    share = re.fullmatch(r"(\d*[.,]?\d+) ?%.*", text)
+    step = Fraction(share[1].replace(",", ".")) if share else Fraction(0)
+    whole = re.fullmatch(r"(\d{2,5}) ?= ?(.+)", text)
+    counts = 100 / step if step else Fraction(whole[1]) if whole else None
+    if counts is None:
+        return _hertz(text)
+    if counts.denominator != 1 or counts > 0xFFFF:
+        raise WrongUse(f'"{text}" is no 1 to 65535 counts: write 10000 = P00.03, or 0.01 %')
+    of = whole[2].strip() if whole else ""
+    return int(counts), "" if "%" in of else of
 
 
 def _two_numbers(text: str) -> tuple[float, float]:
