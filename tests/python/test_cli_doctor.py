@@ -73,6 +73,12 @@ def test_the_options_before_the_command_count() -> None:
     assert {row["unit"] for row in behind} == {None, 1}
 
 
+def test_without_a_unit_whoever_answers_is_examined() -> None:
+    """SIM has the units 1 and 2; a unit that nobody named is no reason to ask unit 1 alone."""
+    for words in (["doctor", SIM], ["--port", SIM, "doctor"]):
+        assert {1, 2} <= {row["unit"] for row in rows(run("--json", *words))}
+
+
 def test_a_unit_that_does_not_say_what_it_is_can_be_named() -> None:
     """A GD600 has no identification code. Its P00.01 and P00.06 are asked for where it was named."""
     unknown = rows(run("--json", "doctor", "sim://gd600?clock=virtual"))

@@ -57,7 +57,7 @@ def doctor(
     port = port or session.port
     if port is None:
         raise WrongUse(f"no port: give it, as in `drivebus doctor {EXAMPLE_PORT}`; `drivebus ports` lists them")
-    if unit is None and context.find_root().get_parameter_source("unit") is not ParameterSource.DEFAULT:
+    if unit is None and context.find_root().get_parameter_source("units") is not ParameterSource.DEFAULT:
         unit = session.unit
     bits, parity, stop = line_format or session.line_format
     out = session.out
