@@ -467,6 +467,34 @@ class TestYaskawa:
             drive.stop()
         assert written(line)[1:] == ["10 00 01 00 01 02 00 01", "10 00 01 00 01 02 00 00"]
 
+    @pytest.mark.parametrize("named", ["V1000", "Q2A", "GA700", "GA800", "GA500"])
+    def test_its_sisters_are_run_by_the_frame_of_their_manual(self, line: Simulator, named: str) -> None:
+        """01 10 00 01 00 02 04 00 01 17 70 6D B7, forward at 60.00 Hz: GA700 manual (yaskawaindia.in, pageid 1146)."""
+        with Bus(line) as bus:
+            drive = bus.drive(1, named, unverified=True, variants={"speed_unit": "Hz"})
+            drive.run(60.0)
+            drive.stop()
+            sent = [data.hex(" ") for _, who, data in line.line.trace() if who == "master" and data[1] == 0x10]
+        assert sent[0] == "01 10 00 01 00 02 04 00 01 17 70 6d b7"
+        assert written(line)[1:] == ["10 00 01 00 01 02 00 00"]
+
+    @pytest.mark.parametrize(
+        ("asked", "code", "means"),
+        [
+            # 02 83 03 F1 31 and 01 90 02 CD C1 stand on p. 284 of the GA700's (SIEPC71061705H).
+            ("03 00 20 00 11", 0x03, "no_such"),
+            ("10 0f 00 00 01 02 00 00", 0x02, "no_such"),
+            ("10 00 01 00 01 02 00 03", 0x21, "no_such"),
+            ("10 00 4b 00 01 02 00 00", 0x22, "not_now"),
+        ],
+    )
+    def test_it_refuses_by_the_codes_of_its_sisters(self, line: Simulator, asked: str, code: int, means: str) -> None:
+        """V1000 Option EtherNet/IP Technical Manual, p. 39."""
+        with Bus(line) as bus, pytest.raises(drivebus.Refused) as refused:
+            bus.transact(1, bytes.fromhex(asked), force=True)
+        assert refused.value.code == code
+        assert drivebus.Profile.builtin("a1000").exception_means(code) == means
+
     @pytest.mark.parametrize("named", ["gd350", "gd600", "gd3000", "chf100a", "chv100", "ms300", "vfd500"])
     def test_named_as_another_it_gets_nothing(self, line: Simulator, named: str) -> None:
         with Bus(line) as bus:

@@ -38,12 +38,12 @@ READ_ONLY = {
     "eds300": 0x05,
     **dict.fromkeys(
         [
-            *("ms300", "vfd-e", "yl620", "a1000", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
+            *("ms300", "vfd-e", "yl620", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
             *("acs580", "atv12", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15", "frenic"),
         ],
         0x02,
     ),
-    "j1000": 0x22,
+    **dict.fromkeys(["a1000", "j1000"], 0x22),
 }
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
 OUT_OF_RANGE = {
@@ -52,7 +52,6 @@ OUT_OF_RANGE = {
             "ms300",
             "vfd-e",
             "yl620",
-            "a1000",
             "saj8000m",
             "sunfar-e300",
             "v20",
@@ -65,7 +64,7 @@ OUT_OF_RANGE = {
         ],
         0x03,
     ),
-    "j1000": 0x21,
+    **dict.fromkeys(["a1000", "j1000"], 0x21),
 }
 """And a value that is out of range, where it is not their 04H."""
 

@@ -9,8 +9,9 @@
 //!   hundredths of a hertz. A write to them needs an Enter command, so they cannot be written here.
 //! - Assumption: 0023H, 0024H and 0026H are set frequency, output frequency and tenths of an ampere. 0032H and the other
 //!   words between are not here.
-//! - Assumption: refusals are 01H to 03H as Modbus has them, and 04H for what is not done now.
-//! - Assumption: 0001H and 0002H read as they were written.
+//! - Assumption: it refuses as its sisters do: 01H, 02H, 21H and 22H of a V1000 (manual of its EtherNet/IP option, p. 39), 03H of a
+//!   J1000 (SIEP C710606 33A, p. 206).
+//! - Assumption: 0001H and 0002H read as they were written. No output is ever closed (002DH), and there is no PID (0038H, 0039H).
 //! - Ramps have no parameters in the pages at hand; the times are fixed. An overload trips fault 11, which no word shows by
 //!   number. A silent bus trips nothing.
 
@@ -20,7 +21,7 @@ use super::{
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::map::Access;
-use crate::drive::refusal::by_the_specification;
+use crate::drive::refusal::Refusal;
 
 const FREQUENCY_SOURCE: u16 = 0x0180;
 const COMMAND_SOURCE: u16 = 0x0181;
@@ -33,7 +34,7 @@ pub(crate) fn a1000() -> Family {
         functions: vec![0x03, 0x08, 0x10],
         max_words: MAX_WORDS,
         across_groups: true,
-        exception: by_the_specification,
+        exception,
         memory: Memory::EepromOnly,
         identification: 0,
         command: Some(0x0001),
@@ -53,6 +54,17 @@ pub(crate) fn a1000() -> Family {
         delay: USUAL_DELAY,
         max_hertz: USUAL_MAX_HZ,
         faults: Faults { overload: Some(11), silent_bus: None },
+    }
+}
+
+/// That a password, and a motor that runs, are refused with 22H is assumed.
+fn exception(refusal: Refusal) -> u8 {
+    match refusal {
+        Refusal::Function => 0x01,
+        Refusal::Address | Refusal::Unreadable => 0x02,
+        Refusal::Structure => 0x03,
+        Refusal::Value => 0x21,
+        Refusal::ReadOnly | Refusal::Running | Refusal::Password | Refusal::Locked => 0x22,
     }
 }
 
@@ -80,10 +92,12 @@ const REGISTERS: &[Register] = &[
     Register::read(0x002A, Shows::Zero),
     Register::read(0x002B, Shows::Inputs(None)),
     Register::read(0x002C, Shows::bits(STATUS_2)),
+    Register::read(0x002D, Shows::Zero),
     Register::read(0x0031, Shows::Measured(Measure::BusVoltage, 1.0)),
     Register::read(0x0034, Shows::bits(&[Bit::Always(0x4130)])),
     Register::read(0x0035, Shows::Zero),
     Register::read(0x0038, Shows::Zero),
+    Register::read(0x0039, Shows::Zero),
     Register::read(0x003D, Shows::Zero),
     Register::read(0x003E, Shows::Measured(Measure::Speed, 1.0)),
     Register::read(0x003F, Shows::Measured(Measure::Frequency, 200.0)),
