@@ -364,6 +364,7 @@ class TestDelta:
                 "fd00",
                 "1003",
             ),
+            "008b",
         ]
 
     @pytest.mark.parametrize(("hertz", "word"), [(4.16, 0x01A0), (2.64, 0x0108), (2.66, 0x010A)])

@@ -40,6 +40,7 @@ READ_ONLY = {
         [
             *("ms300", "vfd-e", "yl620", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
             *("acs580", "atv12", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15", "frenic"),
+            "optidrive-e3",
         ],
         0x02,
     ),
@@ -61,6 +62,7 @@ OUT_OF_RANGE = {
             "fr-d700",
             "vf-s15",
             "frenic",
+            "optidrive-e3",
         ],
         0x03,
     ),
@@ -73,6 +75,7 @@ NARROWER = {("frenic", "set_frequency")}
 
 WITHOUT = {
     "atv600": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
+    "optidrive-e3": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
     "vfd500": {"jog_stop"},
     "md500": {"jog_stop"},
     "frenic": {"coast", "jog_forward", "jog_reverse", "jog_stop"},

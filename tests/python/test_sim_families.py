@@ -52,6 +52,7 @@ FAMILIES = {
     36: "vf-s15",
     37: "huanyang-hy",
     38: "frenic",
+    39: "optidrive-e3",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]
@@ -261,6 +262,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "fc202",
             "h100",
             "vf-s15",
+            "optidrive-e3",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:

@@ -62,12 +62,14 @@ SILENT_ON_CODES = [
     "j1000",
     "vf-s15",
     "frenic",
+    "optidrive-e3",
 ]
 """The families whose units refuse 2103H."""
 
 SIGNED = [
     *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "v20"),
     *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic"),
+    "optidrive-e3",
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -109,6 +111,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "vf-s15": ["vf-s15"],
     # And this one 080EH and 0809H.
     "frenic": ["frenic"],
+    # And this one 0005H, its state, and 008BH, P-12.
+    "optidrive-e3": ["optidrive-e3"],
     "eds300": ["eds300"],
     "sunfar-e300": ["sunfar-e300"],
     # And these rFr and CMD: 0C82H and 2135H; this one Otr, 0C85H, and that one HMIS, 0CA8H.

@@ -229,6 +229,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("huanyang-hy", 30),
         ("md500", 26),
         ("ms300", 17),
+        ("optidrive-e3", 17),
         ("saj8000m", 14),
         ("sunfar-e300", 6),
         ("v20", 19),

@@ -94,8 +94,18 @@ fn of_the_shipped_profiles_only_six_words_say_two_things() {
             assert!(
                 said.len() < 2
                     || [
-                        "vfd500", "a1000", "fc51", "fc202", "fr-d700", "frenic", "v20", "acs355", "acs580", "j1000",
-                        "vf-s15"
+                        "vfd500",
+                        "a1000",
+                        "fc51",
+                        "fc202",
+                        "fr-d700",
+                        "frenic",
+                        "v20",
+                        "acs355",
+                        "acs580",
+                        "j1000",
+                        "vf-s15",
+                        "optidrive-e3"
                     ]
                     .contains(&name),
                 "{name}: {raw:04X}H is {said:?}"

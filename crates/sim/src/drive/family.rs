@@ -32,6 +32,7 @@ mod huanyang;
 mod j1000;
 mod md500;
 mod ms300;
+mod optidrive;
 pub(crate) mod own;
 mod register;
 mod roles;
@@ -154,7 +155,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 38] = [
+const FAMILIES: [fn() -> Family; 39] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -192,6 +193,7 @@ const FAMILIES: [fn() -> Family; 38] = [
     vf_s15::vf_s15,
     frenic::frenic,
     h100::h100,
+    optidrive::e3,
     huanyang::huanyang,
 ];
 

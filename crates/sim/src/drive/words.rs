@@ -97,6 +97,7 @@ impl Drive {
         let (value, place) = match bit {
             Bit::Ready(place) => (u16::from(machine.fault().is_none()), place),
             Bit::NotReady(place) | Bit::Fault(place) => (u16::from(machine.fault().is_some()), place),
+            Bit::FaultNumber(place) => (machine.fault().unwrap_or(0), place),
             Bit::Running(place) => (u16::from(machine.is_running()), place),
             // At no frequency the command says which way it will turn.
             Bit::Reverse(place) => {

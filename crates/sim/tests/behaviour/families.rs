@@ -204,6 +204,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "j1000",
         "vf-s15",
         "frenic",
+        "optidrive-e3",
     ] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }

@@ -16,6 +16,7 @@ mod fc51;
 mod fuji;
 mod goodrives;
 mod inovance;
+mod invertek;
 mod memory;
 mod mitsubishi;
 mod own_profiles;

@@ -101,6 +101,8 @@ pub(crate) enum Bit {
     /// 1 with a fault.
     NotReady(u8),
     Fault(u8),
+    /// The number of the fault, from this bit on; 0 without one.
+    FaultNumber(u8),
     Running(u8),
     /// 1 while the output frequency is below zero.
     Reverse(u8),
