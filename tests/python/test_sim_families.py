@@ -53,6 +53,7 @@ FAMILIES = {
     37: "huanyang-hy",
     38: "frenic",
     39: "optidrive-e3",
+    40: "sj200",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]

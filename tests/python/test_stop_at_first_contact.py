@@ -33,6 +33,8 @@ QUESTIONS = {
     **dict.fromkeys(("atv312", "atv12", "atv600"), (7, 120)),
     "frenic": (6, 105),
     "v20": (8, 140),
+    # A WJ200 has its direction where this one stops.
+    "sj200": (7, 125),
     # It is commanded where Goodrives and others have parameters, some of them without a code.
     "optidrive-e3": (7, 125),
     # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there.

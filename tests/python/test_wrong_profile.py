@@ -63,6 +63,7 @@ SILENT_ON_CODES = [
     "vf-s15",
     "frenic",
     "optidrive-e3",
+    "sj200",
 ]
 """The families whose units refuse 2103H."""
 
@@ -70,6 +71,7 @@ SIGNED = [
     *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "v20"),
     *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic"),
     "optidrive-e3",
+    "sj200",
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -91,8 +93,9 @@ TAKEN_FOR: dict[str, list[str]] = {
     "gd200a": ["gd200a"],
     # This one answers r25.00 and P30.14, which no other does.
     "vfd500": ["vfd500"],
-    # This one has coils, which no other has.
+    # These have coils, which no other has; this one 1003H, and that one 000CH and nothing at 1003H.
     "wj200": ["wj200"],
+    "sj200": ["sj200"],
     # And this one answers 04H, which no other does.
     "h100": ["h100"],
     # And this one 2104H and 2106H, this one 2108H and 2109H, and this one 200BH and 2012H.

@@ -319,14 +319,15 @@ fn the_way_alone_moves_a_motor_that_runs() {
     assert!(!called.done.unwrap_err().why.may_have_acted());
 }
 
-/// It took the first word, and does not say any more what it is when the second is due.
+/// It took the first word, and does not say any more what it is when the second is due. SJ200 manual (manualslib 68018), p. 233: its first
+/// word starts no drive of another family, and its second one turns a WJ200 in reverse.
 #[test]
 fn the_way_alone_is_told_where_the_other_word_is_held_back() {
     for (runs, moves) in [(1, true), (0, false)] {
-        let drive = Obeys::new("wj200", &[(0x1003, runs)], &[]);
+        let drive = Obeys::new("sj200", &[(0x000C, runs)], &[]);
         let called =
             carried_out(Script::new(), drive.seen(true), Forgets { drive, is_told: false }, Start::run(true, None));
-        assert_eq!(called.sent(), [coil(1, 1)]);
+        assert_eq!(called.sent(), [coil(2, 0)]);
         let error = called.done.unwrap_err();
         assert_eq!(error.why.may_have_acted(), moves, "{error}");
         assert_eq!(matches!(error.why, Why::HalfWritten(_)), moves, "{error}");
@@ -341,7 +342,7 @@ struct Forgets {
 
 impl scripted::Unit for Forgets {
     fn read(&mut self, read: Read, now: Instant) -> Reply {
-        let is_question = !read.is_stamped && read.place == Place::from(0x1003);
+        let is_question = !read.is_stamped && read.place == Place::from(0x000C);
         match self.is_told {
             false if is_question => fails(Cause::NoAnswer),
             true if is_question => refuses(0x02),

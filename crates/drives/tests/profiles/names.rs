@@ -128,6 +128,8 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("Invertek Optidrive E3", "optidrive-e3"),
         ("ODE-3", "optidrive-e3"),
         ("Optidrive E2", "optidrive-e3"),
+        ("Hitachi SJ200", "sj200"),
+        ("Hitachi L200", "sj200"),
         ("FC 202", "fc202"),
         ("VLT FC 102", "fc202"),
         ("FC-302", "fc202"),

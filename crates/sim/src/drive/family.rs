@@ -37,6 +37,7 @@ pub(crate) mod own;
 mod register;
 mod roles;
 mod saj8000m;
+mod sj200;
 mod sunfar;
 mod unlisted;
 mod v20;
@@ -155,7 +156,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 39] = [
+const FAMILIES: [fn() -> Family; 40] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -190,6 +191,7 @@ const FAMILIES: [fn() -> Family; 39] = [
     fc202::fc202,
     fr_d700::fr_d700,
     wj200::wj200,
+    sj200::sj200,
     vf_s15::vf_s15,
     frenic::frenic,
     h100::h100,

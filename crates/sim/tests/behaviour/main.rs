@@ -15,6 +15,7 @@ mod faults;
 mod fc51;
 mod fuji;
 mod goodrives;
+mod hitachi;
 mod inovance;
 mod invertek;
 mod memory;
