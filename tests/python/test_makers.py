@@ -146,6 +146,19 @@ MAKERS = [
         shown="",
         unverified=True,
     ),
+    # The frames of a F510: 01 06 25 01 00 01, 00 03 and 00 00; a run and its frequency in one, as in its own addendum.
+    Maker(
+        "e510",
+        prepare=("06 00 02 00 02", "06 00 05 00 05"),
+        forward=("10 25 01 00 02 04 00 01 07 d0",),
+        reverse="06 25 01 00 03",
+        stop="06 25 01 00 00",
+        reset="06 25 01 00 08",
+        fault=13,
+        shown="OL1",
+        sure=True,
+        forward_alone="06 25 01 00 01",
+    ),
     Maker(
         "saj8000m",
         hertz=None,
@@ -316,9 +329,11 @@ def test_nothing_goes_out_that_no_document_of_it_prints(line: Simulator, maker: 
     with Bus(line) as bus:
         plain = bus.drive(1, maker.family)
         if maker.sure:
+            if maker.prepare:
+                bus.drive(1, maker.family, unverified=True).prepare_control(store=True)
             plain.run()
             plain.stop()
-            assert written(line) == [maker.forward_alone, maker.stop]
+            assert written(line) == [*maker.prepare, maker.forward_alone, maker.stop]
             return
         for write in (Drive.run, Drive.jog):
             with pytest.raises(NotAllowed):
@@ -362,6 +377,7 @@ class TestDelta:
                 "c417",
                 "080e",
                 "fd00",
+                "2520",
                 "1003",
             ),
             "008b",

@@ -46,6 +46,7 @@ READ_ONLY = {
         0x02,
     ),
     **dict.fromkeys(["a1000", "j1000"], 0x22),
+    "e510": 0x05,
 }
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
 OUT_OF_RANGE = {

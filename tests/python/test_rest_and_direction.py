@@ -117,6 +117,7 @@ def test_where_no_page_says_that_a_ramp_is_told_the_frequency_is_looked_at(famil
         "atv12",
         "atv312",
         "atv600",
+        "e510",
         "fc202",
         "fr-d700",
         "frenic",

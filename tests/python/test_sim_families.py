@@ -54,6 +54,7 @@ FAMILIES = {
     38: "frenic",
     39: "optidrive-e3",
     40: "sj200",
+    41: "e510",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]

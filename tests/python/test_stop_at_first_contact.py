@@ -21,6 +21,8 @@ QUESTIONS = {
     # And this one for 3F5BH, which an FC 202 has.
     "fc51": (6, 108),
     "yl620": (4, 75),
+    # Where this one is commanded, a CHF100A or a VFD500 may have a parameter.
+    "e510": (5, 91),
     "md500": (5, 90),
     # These are also asked for 080EH, which a FRENIC has: it answers 0 to what it does not use.
     "fr-d700": (6, 112),

@@ -64,12 +64,13 @@ SILENT_ON_CODES = [
     "frenic",
     "optidrive-e3",
     "sj200",
+    "e510",
 ]
 """The families whose units refuse 2103H."""
 
 SIGNED = [
     *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "v20"),
-    *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic"),
+    *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic", "e510"),
     "optidrive-e3",
     "sj200",
 ]
@@ -116,6 +117,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "frenic": ["frenic"],
     # And this one 0005H, its state, and 008BH, P-12.
     "optidrive-e3": ["optidrive-e3"],
+    # And this one 2520H and 2524H.
+    "e510": ["e510"],
     "eds300": ["eds300"],
     "sunfar-e300": ["sunfar-e300"],
     # And these rFr and CMD: 0C82H and 2135H; this one Otr, 0C85H, and that one HMIS, 0CA8H.

@@ -113,6 +113,8 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("FRENIC-MEGA", "frenic"),
         ("vf-s11", "vf-s15"),
         ("JZA", "j1000"),
+        ("Teco E510", "e510"),
+        ("Teco-Westinghouse E510", "e510"),
         ("FR-D740", "fr-d700"),
         ("fr e740", "fr-d700"),
         ("Inovance MD500", "md500"),

@@ -209,6 +209,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("h100", 173),
         ("j1000", 17),
         ("chv100", 24),
+        ("e510", 66),
         ("eds300", 17),
         ("fc51", 23),
         ("fr-d700", 39),

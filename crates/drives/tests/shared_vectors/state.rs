@@ -105,7 +105,8 @@ fn of_the_shipped_profiles_only_six_words_say_two_things() {
                         "acs580",
                         "j1000",
                         "vf-s15",
-                        "optidrive-e3"
+                        "optidrive-e3",
+                        "e510"
                     ]
                     .contains(&name),
                 "{name}: {raw:04X}H is {said:?}"

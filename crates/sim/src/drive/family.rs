@@ -16,6 +16,7 @@ mod atv12;
 mod atv312;
 mod atv600;
 mod chf100a;
+mod e510;
 mod eds300;
 mod fc202;
 mod fc51;
@@ -156,7 +157,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 40] = [
+const FAMILIES: [fn() -> Family; 41] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -194,6 +195,7 @@ const FAMILIES: [fn() -> Family; 40] = [
     sj200::sj200,
     vf_s15::vf_s15,
     frenic::frenic,
+    e510::e510,
     h100::h100,
     optidrive::e3,
     huanyang::huanyang,

@@ -202,6 +202,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "md500",
         "fr-d700",
         "j1000",
+        "e510",
         "vf-s15",
         "frenic",
         "optidrive-e3",

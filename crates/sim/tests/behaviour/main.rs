@@ -24,6 +24,7 @@ mod own_profiles;
 mod ports;
 mod refusals;
 mod running;
+mod teco;
 mod toshiba;
 mod vfd500;
 mod wire;
