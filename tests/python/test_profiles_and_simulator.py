@@ -39,7 +39,7 @@ READ_ONLY = {
     **dict.fromkeys(
         [
             *("ms300", "vfd-e", "yl620", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
-            *("acs580", "atv12", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15", "frenic"),
+            *("acs580", "atv12", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15", "frenic", "gs2"),
             "optidrive-e3",
             "sj200",
         ],
@@ -66,6 +66,7 @@ OUT_OF_RANGE = {
             "frenic",
             "optidrive-e3",
             "sj200",
+            "gs2",
         ],
         0x03,
     ),

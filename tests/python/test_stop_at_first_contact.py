@@ -17,12 +17,14 @@ QUESTIONS = {
     **dict.fromkeys(("gd600", "gd3000"), (4, 75)),
     **dict.fromkeys(("eds300", "sunfar-e300", "fc202"), (5, 90)),
     # One of these is also asked for 200BH, which a YL620 has: it would turn at ten times the speed.
-    **dict.fromkeys(("ms300", "vfd-e"), (6, 108)),
+    # And for 091BH, by which a GS2 runs.
+    **dict.fromkeys(("ms300", "vfd-e"), (7, 125)),
     # And this one for 3F5BH, which an FC 202 has.
     "fc51": (6, 108),
     "yl620": (4, 75),
     # Where this one is commanded, a CHF100A or a VFD500 may have a parameter.
     "e510": (5, 91),
+    "gs2": (6, 108),
     "md500": (5, 90),
     # These are also asked for 080EH, which a FRENIC has: it answers 0 to what it does not use.
     "fr-d700": (6, 112),

@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 41] = [
+static BUILTINS: [Builtin; 42] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -180,6 +180,7 @@ static BUILTINS: [Builtin; 41] = [
     builtin!("frenic": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("vf-s15": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("e510": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("gs2": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("wj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("sj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("h100": "registers.csv" "parameters.csv" "faults.csv"),

@@ -425,8 +425,8 @@ fn what_is_refused_each_time_was_not_taken() {
 #[test]
 fn what_speaks_against_its_name_without_end_is_not_told_without_end() {
     let mut replies = vec![fails(Cause::NoAnswer), refuses(0x0C)];
-    replies.extend([33, 384, 384, 0].map(Ok));
-    assert!(at_it("sunfar-e300", 361, replies).done.unwrap_err().was_sent);
+    replies.extend([257, 1, 1, 3].map(Ok));
+    assert!(at_it("md500", 361, replies).done.unwrap_err().was_sent);
 }
 
 proptest! {

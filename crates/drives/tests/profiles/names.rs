@@ -114,6 +114,8 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("vf-s11", "vf-s15"),
         ("JZA", "j1000"),
         ("Teco E510", "e510"),
+        ("AutomationDirect GS2", "gs2"),
+        ("gs3", "gs2"),
         ("Teco-Westinghouse E510", "e510"),
         ("FR-D740", "fr-d700"),
         ("fr e740", "fr-d700"),

@@ -207,6 +207,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("chf100a", 27),
         ("wj200", 20),
         ("h100", 173),
+        ("gs2", 43),
         ("j1000", 17),
         ("chv100", 24),
         ("e510", 66),

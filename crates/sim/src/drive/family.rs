@@ -27,6 +27,7 @@ mod gd300;
 mod gd3000;
 mod gd350;
 mod gd600;
+mod gs2;
 mod h100;
 mod handshake;
 mod huanyang;
@@ -157,7 +158,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 41] = [
+const FAMILIES: [fn() -> Family; 42] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -196,6 +197,7 @@ const FAMILIES: [fn() -> Family; 41] = [
     vf_s15::vf_s15,
     frenic::frenic,
     e510::e510,
+    gs2::gs2,
     h100::h100,
     optidrive::e3,
     huanyang::huanyang,
