@@ -79,6 +79,10 @@ pub(crate) struct Drive {
     frames: Frames,
     /// How many of the words before a run have come.
     led_up: usize,
+    /// Whether one of [`Roles::runs_after`](family::Roles::runs_after) has been written.
+    may_run: bool,
+    /// The run that waits for that.
+    waiting: Option<Command>,
     /// What it was told to refuse.
     refusing: Option<Refusing>,
     /// The highest words that it was told to take, by address.
@@ -118,6 +122,8 @@ impl Drive {
             words_written: 0,
             frames: Frames::default(),
             led_up: 0,
+            may_run: false,
+            waiting: None,
             refusing: None,
             limits: BTreeMap::new(),
         }
@@ -139,6 +145,7 @@ impl Drive {
     pub(crate) fn trip(&mut self, code: u16) {
         self.machine.trip(code);
         self.led_up = 0;
+        self.waiting = None;
         self.remember_fault(code);
     }
 
@@ -163,6 +170,7 @@ impl Drive {
         self.last_heard = None;
         self.frames = Frames::default();
         self.led_up = 0;
+        (self.may_run, self.waiting) = (false, None);
         self.machine = self.machine.after_power_loss(now);
         self.settings = settings::settings(self.map.family(), &self.store, 0);
     }
@@ -322,6 +330,7 @@ impl Drive {
     fn run_machine(&mut self, to: Instant) {
         if let Some(code) = self.machine.advance(to) {
             self.led_up = 0;
+            self.waiting = None;
             self.remember_fault(code);
         }
     }
@@ -347,7 +356,10 @@ impl Drive {
     }
 
     /// What is set to be done about a silent bus.
+    ///
+    /// Assumption: where a run waits for a word, it does so again behind a silence.
     fn miss_the_bus(&mut self) {
+        (self.may_run, self.waiting) = (false, None);
         let family = self.family();
         let action = match &family.roles.on_silence {
             None => Some(OnSilence::Trip),

@@ -356,6 +356,12 @@ impl Drive {
             self.unlocked = false;
         }
         self.settings_may_have_changed();
+        if self.family().roles.runs_after.contains(&address) {
+            self.may_run = true;
+            if let Some(run) = self.waiting.take() {
+                self.machine.command(run, &self.settings);
+            }
+        }
         // Assumption: a command that the drive is not set to obey is taken as a word and changes nothing.
         if self.obeys_bus()
             && let Some(command) = self.command_at(address, before, word)
@@ -385,6 +391,11 @@ impl Drive {
                 },
             }
         }
-        self.machine.command(command, &self.settings);
+        let is_start = matches!(command, Command::Run(_) | Command::Jog(_)) && !self.machine.is_running();
+        let must_wait = is_start && !self.may_run && !self.family().roles.runs_after.is_empty();
+        self.waiting = must_wait.then_some(command);
+        if !must_wait {
+            self.machine.command(command, &self.settings);
+        }
     }
 }

@@ -66,6 +66,7 @@ pub(crate) fn gd350() -> Family {
             bus_timeout: Some(Scaled::tenths(0x0E04)),
             on_silence: Some(Silence::at(0x0E05)),
             handshake: None,
+            runs_after: &[],
             other_words: None,
             reads_single_parameters: false,
         },

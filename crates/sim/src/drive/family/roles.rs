@@ -44,6 +44,8 @@ pub(crate) struct Roles {
     pub(crate) on_silence: Option<Silence>,
     /// The words that the command register must get before a run. `None`: a run is obeyed at once.
     pub(crate) handshake: Option<Handshake>,
+    /// A run waits until one of these words has been written since the power came.
+    pub(crate) runs_after: &'static [u32],
     /// The other meaning that commands may have.
     pub(crate) other_words: Option<OtherWords>,
     /// Whether a read may have one parameter and no more.
@@ -198,6 +200,7 @@ impl Roles {
         bus_timeout: None,
         on_silence: None,
         handshake: None,
+        runs_after: &[],
         other_words: None,
         reads_single_parameters: false,
     };
