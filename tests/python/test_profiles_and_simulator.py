@@ -47,6 +47,8 @@ READ_ONLY = {
     ),
     **dict.fromkeys(["a1000", "j1000"], 0x22),
     "e510": 0x05,
+    # Its manual (1755863, p. 39) refuses a write of ETA so.
+    "atv71": 0x04,
 }
 """How a drive refuses a write to what can only be read, where it is not INVT's 07H."""
 OUT_OF_RANGE = {

@@ -15,7 +15,7 @@ import pytest
 import drivebus
 from drivebus import Bus, Drive, Profile, Simulator, State, Unconfirmed
 
-SIGNED = {"atv12": None, "atv312": None, "v20": {"base_frequency": "50 Hz"}}
+SIGNED = {"atv12": None, "atv312": None, "atv71": None, "v20": {"base_frequency": "50 Hz"}}
 
 
 @contextmanager
@@ -117,6 +117,7 @@ def test_where_no_page_says_that_a_ramp_is_told_the_frequency_is_looked_at(famil
         "atv12",
         "atv312",
         "atv600",
+        "atv71",
         "e510",
         "fc202",
         "fr-d700",

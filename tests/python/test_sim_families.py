@@ -56,6 +56,7 @@ FAMILIES = {
     40: "sj200",
     41: "e510",
     42: "gs2",
+    43: "atv71",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]

@@ -51,6 +51,7 @@ SILENT_ON_CODES = [
     "atv312",
     "atv12",
     "atv600",
+    "atv71",
     "v20",
     "acs355",
     "acs580",
@@ -70,7 +71,7 @@ SILENT_ON_CODES = [
 
 SIGNED = [
     *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "v20"),
-    *("acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic", "e510"),
+    *("atv71", "acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic", "e510"),
     "optidrive-e3",
     "sj200",
 ]
@@ -128,6 +129,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "atv12": ["atv12"],
     # And this one both, and 3E80H, a word for pumps.
     "atv600": ["atv600"],
+    # And this one both, and 19FAH, the address of a card.
+    "atv71": ["atv71"],
     # And this one STW, ZSW and the output frequency: 0063H, 006DH and 0017H.
     "v20": ["v20"],
     # And this one the three words of the ABB drives profile, 0000H, 0003H and 0066H.

@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 42] = [
+static BUILTINS: [Builtin; 43] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -172,6 +172,7 @@ static BUILTINS: [Builtin; 42] = [
     builtin!("atv12": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("atv312": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("atv600": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("atv71": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("v20": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("acs355": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("acs580": "registers.csv" "parameters.csv" "faults.csv"),

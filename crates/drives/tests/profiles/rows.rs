@@ -203,6 +203,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("atv12", 50),
         ("atv312", 34),
         ("atv600", 61),
+        ("atv71", 66),
         ("acs580", 15),
         ("chf100a", 27),
         ("wj200", 20),

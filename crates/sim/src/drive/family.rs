@@ -15,6 +15,7 @@ mod acs580;
 mod atv12;
 mod atv312;
 mod atv600;
+mod atv71;
 mod chf100a;
 mod e510;
 mod eds300;
@@ -158,7 +159,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 42] = [
+const FAMILIES: [fn() -> Family; 43] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -186,6 +187,7 @@ const FAMILIES: [fn() -> Family; 42] = [
     atv12::atv12,
     atv312::atv312,
     atv600::atv600,
+    atv71::atv71,
     v20::v20,
     acs355::acs355,
     acs580::acs580,

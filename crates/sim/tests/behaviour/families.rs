@@ -194,6 +194,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "atv312",
         "atv12",
         "atv600",
+        "atv71",
         "v20",
         "acs355",
         "acs580",
