@@ -174,7 +174,7 @@ STARTS: dict[str, Callable[[Any], Any]] = {
 
 
 @pytest.mark.parametrize("what", STARTS)
-@pytest.mark.parametrize(("unit", "named"), list(permutations(("atv12", "atv312", "atv600", "atv71"), 2)))
+@pytest.mark.parametrize(("unit", "named"), list(permutations(("atv12", "atv312", "atv320", "atv600", "atv71"), 2)))
 def test_by_the_name_of_another_it_gets_no_word_but_a_halt(unit: str, named: str, what: str) -> None:
     with Simulator({1: unit}, transport="process", clock="virtual") as line:
         with Bus(line) as bus:
@@ -184,14 +184,14 @@ def test_by_the_name_of_another_it_gets_no_word_but_a_halt(unit: str, named: str
         line.advance(10.0)
         machine = line.drive(1)
         assert (machine.state, machine.frequency, machine.eeprom_writes) == ("stopped", 0.0, 0)
-        # A stop and a coast are the same words to all four.
+        # A stop and a coast are the same words to all five.
         halts = {"stop": {(CMD, 7)}, "coast": {(CMD, 0)}}.get(what, set())
         first, *later = [(at, word) for _, at, word in machine.writes()]
         assert first == (FR1, 164)
         assert set(later) == halts
 
 
-@pytest.mark.parametrize("family", ["atv12", "atv312", "atv600", "atv71"])
+@pytest.mark.parametrize("family", ["atv12", "atv312", "atv320", "atv600", "atv71"])
 def test_each_is_known_by_its_answers(family: str) -> None:
     with Simulator({1: family}, transport="process", clock="virtual") as line, Bus(line) as bus:
         found = bus.identify(1)

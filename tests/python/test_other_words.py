@@ -115,7 +115,9 @@ def test_what_is_written_by_its_address_is_held_back_too(case: dict[str, Any], l
     if "named" in case:
         pytest.skip("another reason holds it back")
     with Bus(line) as bus, pytest.raises(NotAllowed, match=case["says"]):
-        named(bus, case).write_words({"atv600": 8501, "atv71": 8501, "acs580": 0}[case["family"]], 1, force=True)
+        named(bus, case).write_words(
+            {"atv600": 8501, "atv71": 8501, "atv320": 8501, "acs580": 0}[case["family"]], 1, force=True
+        )
     assert written(line) == []
 
 

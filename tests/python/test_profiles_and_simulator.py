@@ -39,7 +39,7 @@ READ_ONLY = {
     **dict.fromkeys(
         [
             *("ms300", "vfd-e", "yl620", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
-            *("acs580", "atv12", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15", "frenic", "gs2"),
+            *("acs580", "atv12", "atv320", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15", "frenic", "gs2"),
             "optidrive-e3",
             "sj200",
         ],
@@ -82,6 +82,7 @@ NARROWER = {("frenic", "set_frequency")}
 WITHOUT = {
     "atv600": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
     "optidrive-e3": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
+    "atv320": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
     "vfd500": {"jog_stop"},
     "md500": {"jog_stop"},
     "frenic": {"coast", "jog_forward", "jog_reverse", "jog_stop"},

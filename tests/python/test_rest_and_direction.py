@@ -116,6 +116,7 @@ def test_where_no_page_says_that_a_ramp_is_told_the_frequency_is_looked_at(famil
         "acs580",
         "atv12",
         "atv312",
+        "atv320",
         "atv600",
         "atv71",
         "e510",

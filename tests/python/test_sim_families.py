@@ -57,6 +57,7 @@ FAMILIES = {
     41: "e510",
     42: "gs2",
     43: "atv71",
+    44: "atv320",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]
@@ -260,6 +261,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "atv312",
             "atv12",
             "atv600",
+            "atv320",
             "v20",
             "acs355",
             "fc51",

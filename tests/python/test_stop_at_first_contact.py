@@ -34,7 +34,7 @@ QUESTIONS = {
     **dict.fromkeys(("chf100a", "saj8000m"), (8, 135)),
     # An Altivar 600 is asked for CHCF, too: in its I/O profile 07H runs it. By the other two names nobody would ask it,
     # so one more word tells that they are none.
-    **dict.fromkeys(("atv312", "atv12", "atv600", "atv71"), (7, 120)),
+    **dict.fromkeys(("atv312", "atv12", "atv320", "atv600", "atv71"), (7, 120)),
     "frenic": (6, 105),
     "v20": (8, 140),
     # A WJ200 has its direction where this one stops.

@@ -52,6 +52,7 @@ SILENT_ON_CODES = [
     "atv12",
     "atv600",
     "atv71",
+    "atv320",
     "v20",
     "acs355",
     "acs580",
@@ -71,7 +72,7 @@ SILENT_ON_CODES = [
 
 SIGNED = [
     *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "v20"),
-    *("atv71", "acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic", "e510"),
+    *("atv71", "atv320", "acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic", "e510"),
     "optidrive-e3",
     "sj200",
 ]
@@ -131,6 +132,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "atv600": ["atv600"],
     # And this one both, and 19FAH, the address of a card.
     "atv71": ["atv71"],
+    # And this one both, and 0CD1H, a frequency.
+    "atv320": ["atv320"],
     # And this one STW, ZSW and the output frequency: 0063H, 006DH and 0017H.
     "v20": ["v20"],
     # And this one the three words of the ABB drives profile, 0000H, 0003H and 0066H.

@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 43] = [
+static BUILTINS: [Builtin; 44] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -173,6 +173,7 @@ static BUILTINS: [Builtin; 43] = [
     builtin!("atv312": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("atv600": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("atv71": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("atv320": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("v20": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("acs355": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("acs580": "registers.csv" "parameters.csv" "faults.csv"),

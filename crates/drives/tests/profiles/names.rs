@@ -99,6 +99,9 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("ATV 71", "atv71"),
         ("ATV61", "atv71"),
         ("altivar 61", "atv71"),
+        ("Altivar 320", "atv320"),
+        ("ATV320", "atv320"),
+        ("Altivar Machine 320", "atv320"),
         ("altivar-312", "atv312"),
         ("ATV 312", "atv312"),
         ("VFD-MS300", "ms300"),
@@ -152,7 +155,7 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
     ] {
         assert_eq!(Profile::builtin(called).unwrap().name(), name, "{called}");
     }
-    for unknown in ["", " - ", "INVT", "Altivar", "Huanyang", "GT", "ATV320", "Goodrive3500", "Goodrive600"] {
+    for unknown in ["", " - ", "INVT", "Altivar", "Huanyang", "GT", "ATV340", "Goodrive3500", "Goodrive600"] {
         assert!(matches!(Profile::builtin(unknown), Err(ProfileError::Unknown { .. })), "{unknown}");
     }
     let folded = |name: &str| name.chars().filter(|one| one.is_alphanumeric()).collect::<String>().to_lowercase();

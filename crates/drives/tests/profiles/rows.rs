@@ -57,8 +57,9 @@ fn rows(family: &str) -> BTreeMap<(String, u16), Row> {
         }
         rows
     };
-    let mut rows = if manifest.contains("\n[extends]\n") { own("gd350") } else { BTreeMap::new() };
     let manifest: toml::Table = manifest.parse().unwrap();
+    let extended = manifest.get("extends").map(|table| table["profile"].as_str().unwrap());
+    let mut rows = extended.map(own).unwrap_or_default();
     if let Some(dropped) = manifest.get("drop") {
         let dropped: Vec<&str> = dropped.as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
         rows.retain(|_, row| !dropped.contains(&cell(row, "code")) && !dropped.contains(&cell(row, "name")));
@@ -204,6 +205,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("atv312", 34),
         ("atv600", 61),
         ("atv71", 66),
+        ("atv320", 66),
         ("acs580", 15),
         ("chf100a", 27),
         ("wj200", 20),

@@ -14,6 +14,7 @@ mod acs355;
 mod acs580;
 mod atv12;
 mod atv312;
+mod atv320;
 mod atv600;
 mod atv71;
 mod chf100a;
@@ -159,7 +160,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 43] = [
+const FAMILIES: [fn() -> Family; 44] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -188,6 +189,7 @@ const FAMILIES: [fn() -> Family; 43] = [
     atv312::atv312,
     atv600::atv600,
     atv71::atv71,
+    atv320::atv320,
     v20::v20,
     acs355::acs355,
     acs580::acs580,

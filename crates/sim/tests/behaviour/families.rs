@@ -195,6 +195,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "atv12",
         "atv600",
         "atv71",
+        "atv320",
         "v20",
         "acs355",
         "acs580",
