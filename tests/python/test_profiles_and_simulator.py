@@ -39,7 +39,8 @@ READ_ONLY = {
     **dict.fromkeys(
         [
             *("ms300", "vfd-e", "yl620", "saj8000m", "sunfar-e300", "fc51", "atv312", "v20", "acs355"),
-            *("acs580", "atv12", "atv320", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15", "frenic", "gs2"),
+            *("acs580", "atv12", "atv320", "atv600", "fc202", "wj200", "h100", "md500", "fr-d700", "vf-s15", "frenic"),
+            "gs2",
             "optidrive-e3",
             "sj200",
         ],

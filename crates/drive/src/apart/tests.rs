@@ -7,7 +7,7 @@ use crate::family::HALTS;
 use drivebus_rtu::huanyang::Protocol;
 
 /// What Python asks of one unit at most.
-const QUESTIONS: usize = 24;
+const QUESTIONS: usize = 40;
 
 const STOP: What = What::Command(Command::Stop);
 

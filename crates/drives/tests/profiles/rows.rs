@@ -213,7 +213,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("gs2", 43),
         ("j1000", 17),
         ("chv100", 24),
-        ("e510", 66),
+        ("e510", 68),
         ("eds300", 17),
         ("fc51", 23),
         ("fr-d700", 39),
