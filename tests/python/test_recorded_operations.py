@@ -19,7 +19,7 @@ from .recorded_operations import FOLDER, conversations, replay
 from .recorded_scenes import MISHAPS, NOTED
 
 AT_LEAST = 2000
-MOST_BYTES = 5_000_000
+MOST_BYTES = 7_000_000
 
 
 @pytest.mark.parametrize("family", NOTED)
