@@ -6,15 +6,14 @@ VDI100 manual (manualslib 1598439), p. 300.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
-from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
 import drivebus
-from drivebus import Bus, Drive, DrivebusError, NotAllowed, Simulator, State, Unverified
+from drivebus import Bus, Drive, NotAllowed, Simulator, State, Unverified
 from drivebus.cli import cli
 
 COMMAND, SETPOINT, COMMAND_SOURCE, FREQUENCY_SOURCE = 0x2501, 0x2502, 0x0002, 0x0005
@@ -129,19 +128,6 @@ def test_what_its_examples_command_are_parameters(line: Simulator) -> None:
     assert line.drive(1).state == "stopped"
 
 
-STARTS: dict[str, Callable[[Any], Any]] = {
-    "run": lambda drive: drive.run(5.0),
-    "run, forced": lambda drive: drive.run(5.0, force=True),
-    "run in reverse": lambda drive: drive.run(5.0, reverse=True),
-    "run as it was set": lambda drive: drive.run(),
-    "jog": lambda drive: drive.jog(),
-    "setpoint": lambda drive: setattr(drive, "setpoint", 5.0),
-    "prepare": lambda drive: drive.prepare_control(store=True),
-    "reset": lambda drive: drive.reset_fault(),
-    "stop": lambda drive: drive.stop(),
-    "coast": lambda drive: drive.coast(),
-    "jog stop": lambda drive: drive.jog_stop(),
-}
 OTHERS = [
     "a1000",
     "j1000",
@@ -157,27 +143,6 @@ OTHERS = [
     "vfd500",
 ]
 """Those that are commanded where it has parameters, and some of those that are not."""
-
-
-@pytest.mark.parametrize("what", STARTS)
-@pytest.mark.parametrize("named", OTHERS)
-def test_by_another_name_nothing_of_it_is_set_or_started(line: Simulator, named: str, what: str) -> None:
-    before = line.drive(1).eeprom_writes
-    with Bus(line) as bus, suppress(DrivebusError, ValueError):
-        STARTS[what](bus.drive(1, named, unverified=True))
-    line.advance(10.0)
-    assert (line.drive(1).state, line.drive(1).frequency, line.drive(1).eeprom_writes) == ("stopped", 0.0, before)
-    assert {(place, word) for _, place, word in line.drive(1).writes()} <= {(COMMAND, 0)}
-
-
-@pytest.mark.parametrize("what", STARTS)
-@pytest.mark.parametrize("unit", OTHERS)
-def test_by_its_name_nothing_of_another_is_set_or_started(unit: str, what: str) -> None:
-    with Simulator({1: unit}, transport="process", clock="virtual") as line:
-        with Bus(line) as bus, suppress(DrivebusError, ValueError):
-            STARTS[what](bus.drive(1, "e510", unverified=True))
-        line.advance(10.0)
-        assert (line.drive(1).state, line.drive(1).frequency, line.drive(1).eeprom_writes) == ("stopped", 0.0, 0)
 
 
 @pytest.mark.parametrize("named", OTHERS)

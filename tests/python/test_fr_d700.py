@@ -17,6 +17,8 @@ import drivebus
 import drivebus.aio
 from drivebus import BadArgument, Bus, Drive, DrivebusError, NotAllowed, NotReady, Profile, Simulator
 
+from .starts import STARTS as EVERY_START
+
 OBEYS = {0x0539: 0, 0x053A: 0, 0x053B: 1}
 """Pr.338, Pr.339 and Pr.340."""
 
@@ -37,16 +39,10 @@ OTHERS: dict[str, dict[int, int]] = {
 WRONG = [("fr-d700", named) for named in OTHERS] + [(unit, "fr-d700") for unit in OTHERS]
 
 STARTS: dict[str, Callable[[Any], Any]] = {
-    "run": lambda drive: drive.run(5.0),
-    "run, forced": lambda drive: drive.run(5.0, force=True),
-    "run in reverse": lambda drive: drive.run(5.0, reverse=True),
-    "run as it was set": lambda drive: drive.run(),
-    "jog": lambda drive: drive.jog(),
-    "setpoint": lambda drive: setattr(drive, "setpoint", 5.0),
+    **EVERY_START,
     "words at 0008H": lambda drive: drive.write_words(0x0008, 2, force=True),
     "words at 0001H": lambda drive: drive.write_words(0x0001, 0, force=True),
     "prepare": lambda drive: drive.prepare_control(store=True),
-    "reset": lambda drive: drive.reset_fault(),
 }
 
 

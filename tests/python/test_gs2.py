@@ -6,13 +6,12 @@ runs one and 0000 stops it, as somebody noted who did it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
-from typing import Any
 
 import pytest
 
-from drivebus import Bus, Drive, DrivebusError, NotAllowed, Simulator, State
+from drivebus import Bus, Drive, NotAllowed, Simulator, State
 
 SETPOINT, RUN, DIRECTION, EXTERNAL_FAULT, RESET = 0x091A, 0x091B, 0x091C, 0x091D, 0x091E
 SOURCES = [(0x0300, 3), (0x0400, 5)]
@@ -91,44 +90,6 @@ def test_where_its_stop_coasts_it_is_told_when_it_stands(line: Simulator, drive:
     line.advance(30.0)
     drive.stop()
     assert line.drive(1).frequency == 0.0
-
-
-STARTS: dict[str, Callable[[Any], Any]] = {
-    "run": lambda drive: drive.run(5.0),
-    "run, forced": lambda drive: drive.run(5.0, force=True),
-    "run in reverse": lambda drive: drive.run(5.0, reverse=True),
-    "run as it was set": lambda drive: drive.run(),
-    "jog": lambda drive: drive.jog(),
-    "setpoint": lambda drive: setattr(drive, "setpoint", 5.0),
-    "prepare": lambda drive: drive.prepare_control(store=True),
-    "reset": lambda drive: drive.reset_fault(),
-    "stop": lambda drive: drive.stop(),
-    "coast": lambda drive: drive.coast(),
-    "jog stop": lambda drive: drive.jog_stop(),
-}
-OTHERS = ["ms300", "vfd-e", "yl620", "a1000", "j1000", "acs355", "fr-d700", "h100", "gd350", "md500", "vfd500", "e510"]
-"""Those that have its status words, those that are commanded where it has parameters, and some of the others."""
-
-
-@pytest.mark.parametrize("what", STARTS)
-@pytest.mark.parametrize("named", OTHERS)
-def test_by_another_name_nothing_of_it_is_set_or_started(line: Simulator, named: str, what: str) -> None:
-    before = line.drive(1).eeprom_writes
-    with Bus(line) as bus, suppress(DrivebusError, ValueError):
-        STARTS[what](bus.drive(1, named, unverified=True))
-    line.advance(10.0)
-    assert (line.drive(1).state, line.drive(1).frequency, line.drive(1).eeprom_writes) == ("stopped", 0.0, before)
-    assert {(place, word) for _, place, word in line.drive(1).writes()} <= {(RUN, 0)}
-
-
-@pytest.mark.parametrize("what", STARTS)
-@pytest.mark.parametrize("unit", OTHERS)
-def test_by_its_name_nothing_of_another_is_set_or_started(unit: str, what: str) -> None:
-    with Simulator({1: unit}, transport="process", clock="virtual") as line:
-        with Bus(line) as bus, suppress(DrivebusError, ValueError):
-            STARTS[what](bus.drive(1, "gs2", unverified=True))
-        line.advance(10.0)
-        assert (line.drive(1).state, line.drive(1).frequency, line.drive(1).eeprom_writes) == ("stopped", 0.0, 0)
 
 
 @pytest.mark.parametrize("hertz", [20.0, 41.6, 26.4])

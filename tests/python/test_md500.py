@@ -16,6 +16,8 @@ import pytest
 
 from drivebus import BadArgument, Bus, Drive, DrivebusError, NotReady, Simulator
 
+from .starts import STARTS as EVERY_START
+
 SETTINGS: dict[str, dict[int, int]] = {
     # What makes each obey the bus, as its keypad would have it.
     "md500": {0xF002: 2, 0xF003: 9},
@@ -32,18 +34,12 @@ WRONG = [("md500", named) for named in SETTINGS if named != "md500"]
 WRONG += [(unit, "md500") for unit in SETTINGS if unit != "md500"]
 
 STARTS: dict[str, Callable[[Any], Any]] = {
-    "run": lambda drive: drive.run(5.0),
-    "run, forced": lambda drive: drive.run(5.0, force=True),
-    "run in reverse": lambda drive: drive.run(5.0, reverse=True),
-    "run as it was set": lambda drive: drive.run(),
-    "jog": lambda drive: drive.jog(),
-    "setpoint": lambda drive: setattr(drive, "setpoint", 5.0),
+    **EVERY_START,
     # One count is a share of 0.01 % here, and runs a CHF100A.
     "least setpoint": lambda drive: setattr(drive, "setpoint", 0.005),
     "words at 1000H": lambda drive: drive.write_words(0x1000, 1, force=True),
     "words at 2000H": lambda drive: drive.write_words(0x2000, 1, force=True),
     "prepare": lambda drive: drive.prepare_control(store=True),
-    "reset": lambda drive: drive.reset_fault(),
 }
 
 

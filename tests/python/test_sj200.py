@@ -17,6 +17,7 @@ from drivebus import Bus, Drive, DrivebusError, Simulator, State
 
 from .jobs import carry_out_awaited
 from .on_the_wire import written
+from .starts import STARTS
 
 RUN = bytes.fromhex("0A 05 00 01 FF 00 DC 81")
 
@@ -33,16 +34,6 @@ SETTINGS: dict[str, dict[int, int]] = {
 }
 WRONG = [("sj200", named) for named in SETTINGS if named != "sj200"]
 WRONG += [(unit, "sj200") for unit in SETTINGS if unit != "sj200"]
-
-STARTS: dict[str, Callable[[Any], Any]] = {
-    "run": lambda drive: drive.run(5.0),
-    "run, forced": lambda drive: drive.run(5.0, force=True),
-    "run in reverse": lambda drive: drive.run(5.0, reverse=True),
-    "run as it was set": lambda drive: drive.run(),
-    "jog": lambda drive: drive.jog(),
-    "setpoint": lambda drive: setattr(drive, "setpoint", 5.0),
-    "reset": lambda drive: drive.reset_fault(),
-}
 
 
 @pytest.fixture

@@ -22,6 +22,8 @@ import drivebus
 import drivebus.aio
 from drivebus import Bus, Drive, DrivebusError, Simulator
 
+from .starts import STARTS as EVERY_START
+
 SETTINGS = {
     # What makes each obey the bus, as its keypad would have it.
     "ms300": {0x0015: 2, 0x0014: 1},
@@ -34,16 +36,10 @@ COUNTS = {"ms300": 500, "vfd-e": 500, "yl620": 50}
 WRONG = [(unit, named) for unit in SETTINGS for named in SETTINGS if unit != named]
 
 STARTS: dict[str, Callable[[Any], Any]] = {
-    "run": lambda drive: drive.run(5.0),
-    "run, forced": lambda drive: drive.run(5.0, force=True),
-    "run in reverse": lambda drive: drive.run(5.0, reverse=True),
-    "run as it was set": lambda drive: drive.run(),
-    "jog": lambda drive: drive.jog(),
-    "setpoint": lambda drive: setattr(drive, "setpoint", 5.0),
+    **EVERY_START,
     "write": lambda drive: drive.write("set_frequency", 5.0),
     "words": lambda drive: drive.write_words(0x2001, 500),
     "prepare": lambda drive: drive.prepare_control(store=True),
-    "reset": lambda drive: drive.reset_fault(),
 }
 
 

@@ -1,0 +1,88 @@
+"""Families that share addresses and no words: no name of another sets or starts one, and its own name no other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import pytest
+
+from drivebus import Bus, DrivebusError, Simulator
+
+from .starts import STARTS
+
+EVERYTHING: dict[str, Callable[[Any], Any]] = {
+    **STARTS,
+    "prepare": lambda drive: drive.prepare_control(store=True),
+    "stop": lambda drive: drive.stop(),
+    "coast": lambda drive: drive.coast(),
+    "jog stop": lambda drive: drive.jog_stop(),
+}
+
+
+class Unit(NamedTuple):
+    """What makes it obey the bus, address and word; the address that its own stop clears; as what it is named."""
+
+    obeys: list[tuple[int, int]]
+    command: int
+    others: list[str]
+
+
+UNITS = {
+    # Commanded where it has parameters: the first seven.
+    "e510": Unit(
+        [(0x0002, 2), (0x0005, 5)],
+        0x2501,
+        [
+            "a1000",
+            "j1000",
+            "acs355",
+            "acs580",
+            "fr-d700",
+            "v20",
+            "chf100a",
+            "h100",
+            "gd350",
+            "ms300",
+            "md500",
+            "vfd500",
+            "frenic",
+        ],
+    ),
+    # The first three have its status words.
+    "gs2": Unit(
+        [(0x0300, 3), (0x0400, 5)],
+        0x091B,
+        ["ms300", "vfd-e", "yl620", "a1000", "j1000", "acs355", "fr-d700", "h100", "gd350", "md500", "vfd500", "e510"],
+    ),
+}
+PAIRS = [(unit, other) for unit, known in UNITS.items() for other in known.others]
+
+
+@pytest.mark.parametrize("what", EVERYTHING)
+@pytest.mark.parametrize(("unit", "named"), PAIRS)
+def test_by_another_name_nothing_of_it_is_set_or_started(unit: str, named: str, what: str) -> None:
+    known = UNITS[unit]
+    with Simulator({1: unit}, transport="process", clock="virtual") as line:
+        with Bus(line) as bus:
+            for address, word in known.obeys:
+                bus.write(1, address, word)
+        line.drive(1).take_writes()
+        before = line.drive(1).eeprom_writes
+        with Bus(line) as bus, suppress(DrivebusError, ValueError):
+            EVERYTHING[what](bus.drive(1, named, unverified=True))
+        line.advance(10.0)
+        drive = line.drive(1)
+        assert (drive.state, drive.frequency, drive.eeprom_writes) == ("stopped", 0.0, before)
+        assert {(place, word) for _, place, word in drive.writes()} <= {(known.command, 0)}
+
+
+@pytest.mark.parametrize("what", EVERYTHING)
+@pytest.mark.parametrize(("named", "unit"), PAIRS)
+def test_by_its_name_nothing_of_another_is_set_or_started(unit: str, named: str, what: str) -> None:
+    with Simulator({1: unit}, transport="process", clock="virtual") as line:
+        with Bus(line) as bus, suppress(DrivebusError, ValueError):
+            EVERYTHING[what](bus.drive(1, named, unverified=True))
+        line.advance(10.0)
+        assert (line.drive(1).state, line.drive(1).frequency, line.drive(1).eeprom_writes) == ("stopped", 0.0, 0)
