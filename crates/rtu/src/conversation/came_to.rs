@@ -272,8 +272,7 @@ impl<'r> Conversation<'r> {
             let place = (table, address);
             match result.as_ref().map_err(|slip| slip.why) {
                 Ok(_) => known.longer.given(unit, place),
-                Err(why) if self.asks_again(why) => {}
-                Err(why) if why.is_refusal() => known.longer.refused(unit, place, count),
+                Err(why) if why.refuses_words(&self.question.meanings) => known.longer.refused(unit, place, count),
                 Err(why) if why.is_silence() => known.longer.silent(unit, place, count),
                 Err(_) => {}
             }
@@ -298,7 +297,7 @@ impl<'r> Conversation<'r> {
             self.course.asks_otherwise();
             self.state = State::Passing;
             return;
-        } else if why.is_refusal() && (!self.asks_again(why) || known.others) {
+        } else if self.says_no(why, ask) || why.is_refusal() && known.others {
             // It may be meant for something else that was asked, or for the words that nobody asked for:
             // by whatever code, where the name is wrong in which it is read.
             self.attempt.apart = false;
@@ -307,6 +306,15 @@ impl<'r> Conversation<'r> {
             return;
         }
         self.end_attempt(now, known, result);
+    }
+
+    /// Whether the unit refuses `ask`, as which the question was put, for good: also where it only asks for more.
+    fn says_no(&self, why: Unanswered, ask: &Ask<'r>) -> bool {
+        if words_of(&ask.request) > words_of(&self.ask().request) {
+            why.refuses_words(&self.question.meanings)
+        } else {
+            why.is_refusal() && !self.asks_again(why)
+        }
     }
 
     /// The question was put as `put` says: gives what can only be the answer, or has it asked once more.
@@ -322,7 +330,7 @@ impl<'r> Conversation<'r> {
         else {
             return self.end_attempt(now, known, result);
         };
-        let refused = result.is_err_and(|slip| slip.why.is_refusal() && !self.asks_again(slip.why));
+        let refused = result.is_err_and(|slip| self.says_no(slip.why, ask));
         let proves = match put {
             Put::Plain => return self.end_attempt(now, known, result),
             Put::Apart(_) => result.is_ok(),
@@ -408,5 +416,13 @@ impl<'r> Conversation<'r> {
         }
         let slip = self.slip(Unanswered::Disagreeing { asked }, sent, ended);
         self.end_attempt(now, known, Err(slip));
+    }
+}
+
+/// How many words a read asks for; 0 of anything else.
+const fn words_of(request: &Request<'_>) -> u16 {
+    match request {
+        Request::Read { count, .. } => *count,
+        _ => 0,
     }
 }

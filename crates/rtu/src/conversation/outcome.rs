@@ -157,6 +157,13 @@ impl Unanswered {
         }
     }
 
+    /// Whether the unit says by it that it does not give the words of a longer read.
+    ///
+    /// A code that means "ask again" to a family alone may say so too: what refuses malformed requests refuses too many words.
+    pub(super) const fn refuses_words(self, meanings: &Meanings) -> bool {
+        self.is_refusal() && !(self.asks_again(meanings) && self.asks_again(&Meanings::STANDARD))
+    }
+
     /// Whether the unit says by it that it could not take a request, this one or one before it, and may the next time.
     pub(super) const fn asks_again(self, meanings: &Meanings) -> bool {
         match self {
