@@ -60,6 +60,7 @@ impl Bus {
     /// [`NotAllowed`](crate::ErrorKind::NotAllowed): no such unit.
     pub fn drive(&self, unit: u8, profile: &Arc<Profile>) -> Result<Drive, Error> {
         let unit = checks::unit(unit)?;
+        self.core.set_meanings(unit, drivebus_drive::meanings(profile));
         self.core.set_protocol(unit, drivebus_drive::protocol(profile));
         Ok(Drive { bus: self.clone(), named: Named::new(unit, profile, self.record(unit)) })
     }
