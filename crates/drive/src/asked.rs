@@ -10,6 +10,13 @@ use crate::task::{Cause, LineError, Mailbox, Read};
 /// How often a word is asked for once more where the refusal of it decides nothing. A unit says so at once.
 const AGAIN: u32 = 4;
 
+/// What some drives answer where they have nothing, instead of a refusal. That a word of a signature is just this, and means it, is
+/// assumed of none.
+///
+/// Source: *Altivar 71 integrated Modbus* (Schneider 1755863), p. 39, of reads of several words; of reads of one word a program
+/// that runs an Altivar 320 tells it.
+const NOTHING: u16 = 0x8000;
+
 /// Exceptions by which a gateway says that the unit behind it is out of reach, or silent.
 ///
 /// Source: *Modbus Application Protocol* V1.1b3, §7.
@@ -113,7 +120,10 @@ pub async fn answer_at<E: LineError>(line: &Mailbox<E>, read: Read) -> Result<An
 
 fn answered(read: Read, words: &[u16]) -> Answer {
     // One is there: a step takes as many words as were asked for.
-    Answer::word_at(read.place, words.first().copied().unwrap_or_default())
+    match words.first().copied().unwrap_or_default() {
+        NOTHING if !read.place.table.is_bits() => refused(read, ExceptionCode::ILLEGAL_ADDRESS),
+        word => Answer::word_at(read.place, word),
+    }
 }
 
 fn refused(read: Read, code: ExceptionCode) -> Answer {
