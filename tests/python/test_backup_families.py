@@ -29,7 +29,7 @@ def can_be_set(family: str) -> bool:
 
 
 WITH = [family for family in drivebus.profiles() if can_be_set(family)]
-UNPROVED = {"acs355", "j1000"}
+UNPROVED = {"acs355", "atv320", "j1000"}
 """Of these no page prints by which word they store, or what they have: nothing is given back without `unverified`."""
 WITHOUT = [family for family in drivebus.profiles() if not parameters(family)]
 

@@ -33,7 +33,7 @@ def line() -> Iterator[Simulator]:
 @pytest.fixture
 def drive(line: Simulator) -> Iterator[Drive]:
     with Bus(line) as bus:
-        yield bus.drive(1, "e510")
+        yield bus.drive(1, "e510", unverified=True)
 
 
 def sent(line: Simulator) -> list[str]:
@@ -62,7 +62,9 @@ def test_a_setpoint_is_the_frame_of_its_makers_manual(line: Simulator, drive: Dr
     assert sent(line) == ["01 06 25 02 17 70 2d 12"]
 
 
-def test_it_runs_by_what_is_printed_alone(line: Simulator, drive: Drive) -> None:
+def test_it_runs_at_its_setpoint(line: Simulator, drive: Drive) -> None:
+    with Bus(line) as bus, pytest.raises(Unverified, match="scale"):
+        bus.drive(1, "e510").run(20.0)
     drive.run(20.0)
     drive.wait_for_speed(20.0, timeout=60.0)
     assert line.drive(1).frequency == 20.0

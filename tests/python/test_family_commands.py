@@ -60,6 +60,9 @@ def drive_of(bus: Bus, family: str, *, unverified: bool) -> Drive:
 def prepare(drive: Drive) -> None:
     """Where no write is known that RAM alone keeps, it is kept in EEPROM."""
     drive.prepare_control(store=drive.profile.memory() is None)
+    if drive.profile.name in {"atv71", "atv320"}:
+        # A run waits for the first setpoint.
+        drive.setpoint = 10.0
     if drive.profile.state(1) == "running":
         # Its state is its frequency: told to run at 0 Hz it shows nothing.
         drive.prepare_control(setpoint="frequency", store=True)
@@ -77,7 +80,10 @@ def commanded(simulator: Simulator) -> list[tuple[int, int]]:
     """Address and word of all that was written where a family takes commands and the unit itself has no parameter."""
     profile = Profile.builtin(simulator.drive(1).profile)
     rows = (profile.describe(name) for name in profile.names())
+    setpoint = profile.role("setpoints.frequency")
     registers = REGISTERS - {row.address for row in rows if row.kind == "parameter"}
+    if setpoint is not None:
+        registers -= {profile.describe(setpoint).address} - {profile.command_address}
     found = []
     for _, sender, frame in simulator.line.trace():
         if sender == "master" and profile.requests().protocol == "huanyang":

@@ -45,7 +45,7 @@ def line() -> Iterator[Simulator]:
 @pytest.fixture
 def drive(line: Simulator) -> Iterator[Drive]:
     with Bus(line) as bus:
-        yield bus.drive(1, "sj200")
+        yield bus.drive(1, "sj200", unverified=True)
 
 
 def program(line: Simulator, drive: Any) -> list[Callable[[], Any]]:

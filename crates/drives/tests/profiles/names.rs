@@ -138,7 +138,6 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("ACS180", "acs580"),
         ("Invertek Optidrive E3", "optidrive-e3"),
         ("ODE-3", "optidrive-e3"),
-        ("Optidrive E2", "optidrive-e3"),
         ("Hitachi SJ200", "sj200"),
         ("Hitachi L200", "sj200"),
         ("FC 202", "fc202"),
