@@ -86,7 +86,7 @@ def test_a_whole_job_awaited(line: Simulator) -> None:
 
 def test_a_run_is_the_frame_of_its_manual() -> None:
     with Simulator({10: "sj200"}, transport="process", clock="virtual") as line, Bus(line) as bus:
-        bus.drive(10, "sj200").run(10.0)
+        bus.drive(10, "sj200", unverified=True).run(10.0)
         assert RUN in [frame for _, side, frame in line.line.trace() if side == "master"]
 
 
