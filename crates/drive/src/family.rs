@@ -229,10 +229,10 @@ impl Family {
         place.table == Table::Holding && self.groups.contains(&group)
     }
 
-    /// Whether its units answer at `place` whatever they have there: with 0 where that is nothing.
-    pub(crate) fn answers_with_zero(&self, place: Place) -> bool {
+    /// Whether its units have something at `place`, or answer 0 there where they have nothing.
+    pub(crate) fn would_answer(&self, place: Place) -> bool {
         let [group, _] = place.address.to_be_bytes();
-        place.table == Table::Holding && self.profile.requests().zeros.contains(&group)
+        self.has(place) || place.table == Table::Holding && self.profile.requests().zeros.contains(&group)
     }
 
     /// The place and the word of `command`; `None` where it has no such command.

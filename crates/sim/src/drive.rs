@@ -144,6 +144,11 @@ impl Drive {
     /// Trips the drive with fault `code`, as a cause from outside that is gone at once.
     pub(crate) fn trip(&mut self, code: u16) {
         self.machine.trip(code);
+        self.has_tripped(code);
+    }
+
+    /// A fault ends what was begun of a start, and is remembered.
+    fn has_tripped(&mut self, code: u16) {
         self.led_up = 0;
         self.waiting = None;
         self.remember_fault(code);
@@ -329,9 +334,7 @@ impl Drive {
 
     fn run_machine(&mut self, to: Instant) {
         if let Some(code) = self.machine.advance(to) {
-            self.led_up = 0;
-            self.waiting = None;
-            self.remember_fault(code);
+            self.has_tripped(code);
         }
     }
 

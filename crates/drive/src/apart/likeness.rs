@@ -50,17 +50,14 @@ impl Apart {
         family.is_signed_by(&self.answers)
     }
 
-    /// Whether a unit of `family` would have answered what was answered: it has something at each such place, or answers
-    /// without.
+    /// Whether a unit of `family` would have answered what was answered.
     pub(super) fn explains(&self, family: &Family) -> bool {
-        self.answered().all(|place| family.has(place) || family.answers_with_zero(place))
+        self.answered().all(|place| family.would_answer(place))
     }
 
     /// The same, or its addresses may hold a parameter there that has no row.
     pub(super) fn explains_by_rule(&self, family: &Family) -> bool {
-        let may_answer =
-            |place| family.has(place) || family.may_have_parameter(place) || family.answers_with_zero(place);
-        self.answered().all(may_answer)
+        self.answered().all(|place| family.would_answer(place) || family.may_have_parameter(place))
     }
 
     /// Whether the unit answered any question, and did not refuse them all.
