@@ -127,6 +127,7 @@ def test_a_motor_turns_by_it_and_stops(there: Path, answers: list[str]) -> None:
         (3, "spindle", '"spindle" is no name of the tables and no address'),
         (5, "0012", "write 18, 12H or 0x12"),
         (6, "12h", "12h is run forward already"),
+        (9, "2000H=1", "1 is stop already"),
         (5, "70000", "no word from 0 to 65535"),
         (9, "here=5", '"here" is no name'),
         (12, "30005", "which is an input register"),

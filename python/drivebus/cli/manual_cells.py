@@ -11,6 +11,7 @@ from drivebus.cli.wrong_use import WrongUse
 
 __all__ = [
     "COUNTS",
+    "SCALES",
     "TableRow",
     "UnclearAddresses",
     "count_of",
@@ -36,7 +37,8 @@ _RANGE = re.compile(
 """`0.1-600.0 s (0.1 s)`: ends, unit and step."""
 _HEX = r"0x[0-9a-f]+|[0-9a-f]{1,4}h|(?=.*[a-f])[0-9a-f]{1,4}"
 """What is in hexadecimal beyond doubt."""
-_SCALES = (1, 10, 100, 1000, 10000)
+SCALES = (1, 10, 100, 1000, 10000)
+"""How many counts one unit may have."""
 _CODE = re.compile(r"[A-Z]{0,3}\.?\d{1,3}[.-]\d{1,3}|[A-Z]{1,3}-\d{1,4}|[A-Z]{1,3}\.? ?\d{2,4}|[a-z][A-Za-z0-9]{2,3}")
 """P05.06, F0-01, 02-00, C-02, C014, Pr.117, tFr: how makers call parameters. A number alone may be that of the row."""
 _MARK = re.compile(r"(?<![\w.+-])(\d{1,3}) ?[:=\uff1a] ?")
@@ -153,7 +155,7 @@ def take_step(row: TableRow, cells: dict[str, str]) -> None:
         has_decimals = any(re.search(r"\d[.,]\d", cells.get(what, "")) for what in ("range", "low", "high", "default"))
         is_plain = not row.unit and not row.notes and not cells.get("unit") and not has_decimals
         row.scale = 1 if is_told and is_plain else None
-    elif step and 1 / step in _SCALES:
+    elif step and 1 / step in SCALES:
         row.scale = int(1 / step)
     else:
         row.notes.append(f"the table has steps of {float(step):g}")

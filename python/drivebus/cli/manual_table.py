@@ -10,7 +10,7 @@ import csv
 import io
 import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from drivebus.cli.manual_cells import (
     TableRow,
@@ -67,7 +67,6 @@ class ManualTable:
     def __init__(self) -> None:
         self.rows: list[TableRow] = []
         self.left_out: list[tuple[int, str]] = []
-        self._places: dict[str, int] = {}
         self._names: dict[str, int] = {}
 
     def read(self, data: bytes, source: str, *, count: str | None = None) -> list[TableRow]:
@@ -83,9 +82,9 @@ class ManualTable:
         """
         data = as_sheet(data)
         titles, rows = read_sheet(data, titles_of(data))
-        self._places = _columns(titles, by_code=count == "group.index")
-        cells = [(line, dict(self._cells(row))) for line, row in rows]
-        count = count or count_of(titles[self._places["address"]], [row["address"] for _, row in cells])
+        places = _columns(titles, by_code=count == "group.index")
+        cells = [(line, _cells(row, places)) for line, row in rows]
+        count = count or count_of(titles[places["address"]], [row["address"] for _, row in cells])
         by_code = count == "group.index"
         said = "code" if by_code else "address"
         taken = {(row.table, row.address): row.name for row in self.rows}
@@ -108,10 +107,6 @@ class ManualTable:
         row = TableRow(0, address, "holding", self._name(label), label, source=source)
         self.rows.append(row)
         return row
-
-    def _cells(self, row: Sequence[str]) -> Iterator[tuple[str, str]]:
-        for what, place in self._places.items():
-            yield what, " ".join(row[place].split()) if place < len(row) else ""
 
     def _row(self, line: int, place: tuple[str, int], cells: dict[str, str], source: str) -> TableRow:
         table, address = place
@@ -185,6 +180,11 @@ class ManualTable:
             else:
                 registers.append([at, row.table, *facts, row.high, "", row.variant, row.access, *proof])
         return {"registers.csv": _as_text(registers), "parameters.csv": _as_text(parameters)}
+
+
+def _cells(row: Sequence[str], places: dict[str, int]) -> dict[str, str]:
+    """What stands in *row*, by what the column at each of *places* says."""
+    return {what: " ".join(row[place].split()) if place < len(row) else "" for what, place in places.items()}
 
 
 def _as_text(rows: list[list[str]]) -> str:

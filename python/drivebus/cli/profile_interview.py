@@ -15,7 +15,7 @@ from typing import TypeVar
 import click
 
 import drivebus
-from drivebus.cli.manual_cells import COUNTS, TableRow, UnclearAddresses, place_of
+from drivebus.cli.manual_cells import COUNTS, SCALES, TableRow, UnclearAddresses, place_of
 from drivebus.cli.manual_table import ManualTable
 from drivebus.cli.present.output import remark
 from drivebus.cli.profile_answers import Answers, Bits, Commands, Setting, Share, State
@@ -30,8 +30,8 @@ _COMMANDS = {
     "run_reverse": "Word that runs it in reverse",
     "stop": "Word that stops it along its ramp",
     "coast": "Word that lets it coast",
-    "reset_fault": "Word that resets a fault; ADDRESS=WORD if it goes elsewhere, such as 2002H=2",
 }
+_RESET = "Word that resets a fault; ADDRESS=WORD if it goes elsewhere, such as 2002H=2"
 _STATES = {
     "forward": "while it runs forward",
     "reverse": "while it runs in reverse",
@@ -42,7 +42,6 @@ _STATES = {
 _BY_BITS = ("fault", "forward", "reverse", "running", "stopped")
 """Of those that fit, the first counts, where none is a running motor."""
 _ADDRESS = r"0x[0-9a-f]{1,4}|[0-9a-f]{1,4}h|[34]\d{4,5}"
-_SCALES = (1, 10, 100, 1000, 10000)
 
 
 def ask(table: Path | None, source: str | None, count: str | None) -> Answers:
@@ -139,15 +138,15 @@ class _Interview:
         words: dict[str, int] = {}
         elsewhere: dict[str, tuple[TableRow, int]] = {}
         for command, question in _COMMANDS.items():
-            read = _new(words, _word)
-            said = _optional(question, self._word_there(read) if command == "reset_fault" else _here(read))
-            if said is None:
-                continue
-            row, word = said
-            if row is None or row is register:
+            word = _optional(question, _new(words, _word))
+            if word is not None:
                 words[command] = word
+        if (reset := _optional(_RESET, lambda text: self._reset(text, register, words))) is not None:
+            row, word = reset
+            if row is register:
+                words["reset_fault"] = word
             else:
-                elsewhere[command] = (row, word)
+                elsewhere["reset_fault"] = reset
         if not words:
             remark("Then it is not told anything by name.")
             return None
@@ -266,21 +265,17 @@ class _Interview:
     def _at(self, address: int) -> TableRow | None:
         return next((row for row in self.table.rows if (row.table, row.address) == ("holding", address)), None)
 
-    def _word_there(self, here: Callable[[str], int]) -> Callable[[str], tuple[TableRow | None, int]]:
-        """What reads a word, or a register of its own and its word."""
-
-        def read(text: str) -> tuple[TableRow | None, int]:
-            place, equals, said = (part.strip() for part in text.rpartition("="))
-            if not equals:
-                return None, here(said)
-            word = _word(said)
-            _, address = _place(place)
-            row = self._at(address) or self.table.add(address, "Fault reset", self._source())
-            _allow(row, "wo")
-            _widen(row, [word])
-            return row, word
-
-        return read
+    def _reset(self, text: str, register: TableRow, words: Mapping[str, int]) -> tuple[TableRow, int]:
+        """A word that means one thing only to *register*, or another register and its word."""
+        place, equals, said = (part.strip() for part in text.rpartition("="))
+        address = _place(place)[1] if equals else register.address
+        if address == register.address:
+            return register, _new(words, _word)(said)
+        word = _word(said)
+        row = self._at(address) or self.table.add(address, "Fault reset", self._source())
+        _allow(row, "wo")
+        _widen(row, [word])
+        return row, word
 
     def _source_of(self, row: TableRow) -> str:
         """Where the words of a register are printed; one that no table has was just asked for its page."""
@@ -375,10 +370,6 @@ def _word(text: str) -> int:
     return int(found[3]) if found[3] else int(found[1] or found[2], 16)
 
 
-def _here(read: Callable[[str], int]) -> Callable[[str], tuple[TableRow | None, int]]:
-    return lambda text: (None, read(text))
-
-
 def _new(known: Mapping[str, T], read: Callable[[str], T]) -> Callable[[str], T]:
     """What reads a thing that means one thing only."""
 
@@ -414,7 +405,7 @@ def _hertz(text: str) -> Fraction:
     """What one count is."""
     said = re.fullmatch(r"(\d*[.,]?\d+) ?hz", text.lower())
     step = Fraction(said[1].replace(",", ".")) if said else Fraction(0)
-    if not step or 1 / step not in _SCALES:
+    if not step or 1 / step not in SCALES:
         raise WrongUse(f'"{text}" is no 1, 0.1, 0.01 or 0.001 Hz, such as 0.01 Hz')
     return step
 
