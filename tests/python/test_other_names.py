@@ -22,11 +22,12 @@ EVERYTHING: dict[str, Callable[[Any], Any]] = {
 
 
 class Unit(NamedTuple):
-    """What makes it obey the bus, address and word; the address that its own stop clears; as what it is named."""
+    """What makes it obey the bus, address and word; where its own stop goes, and its word; as what it is named."""
 
     obeys: list[tuple[int, int]]
     command: int
     others: list[str]
+    stop: int = 0
 
 
 UNITS = {
@@ -56,6 +57,16 @@ UNITS = {
         0x091B,
         ["ms300", "vfd-e", "yl620", "a1000", "j1000", "acs355", "fr-d700", "h100", "gd350", "md500", "vfd500", "e510"],
     ),
+    # The first three have its status words, and the fourth its registers of parameters, too.
+    "gs4": Unit(
+        [(0x0300, 3), (0x0400, 1)],
+        0x2000,
+        [
+            *("ms300", "vfd-e", "yl620", "gs2", "a1000", "j1000", "acs355", "fr-d700", "h100", "gd350", "md500"),
+            *("vfd500", "e510", "eds300"),
+        ],
+        stop=1,
+    ),
 }
 PAIRS = [(unit, other) for unit, known in UNITS.items() for other in known.others]
 
@@ -75,7 +86,7 @@ def test_by_another_name_nothing_of_it_is_set_or_started(unit: str, named: str, 
         line.advance(10.0)
         drive = line.drive(1)
         assert (drive.state, drive.frequency, drive.eeprom_writes) == ("stopped", 0.0, before)
-        assert {(place, word) for _, place, word in drive.writes()} <= {(known.command, 0)}
+        assert {(place, word) for _, place, word in drive.writes()} <= {(known.command, known.stop)}
 
 
 @pytest.mark.parametrize("what", EVERYTHING)

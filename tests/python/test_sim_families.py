@@ -58,6 +58,7 @@ FAMILIES = {
     42: "gs2",
     43: "atv71",
     44: "atv320",
+    45: "gs4",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]
@@ -141,7 +142,7 @@ def test_identification_is_the_family_s_own_or_refused(bus: Bus) -> None:
     for family in MODBUS:
         if family in codes:
             assert read(bus, family, 0x2103) == [codes[family]]
-        elif family in ("ms300", "vfd-e", "gs2"):  # its output frequency: manuals, pp. 799 and 4-126
+        elif family in ("ms300", "vfd-e", "gs2", "gs4"):  # its output frequency: manuals, pp. 799 and 4-126
             assert read(bus, family, 0x2103) == [0]
         elif family == "eds300":  # 03H says that there is no such address: manual, p. 45
             assert refusal(bus, family, pdu(0x03, 0x2103, 1)) == 0x03
@@ -270,6 +271,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "vf-s15",
             "optidrive-e3",
             "gs2",
+            "gs4",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:

@@ -25,6 +25,7 @@ QUESTIONS = {
     # Where this one is commanded, a CHF100A or a VFD500 may have a parameter.
     "e510": (5, 91),
     "gs2": (6, 108),
+    "gs4": (6, 108),
     "md500": (5, 90),
     # These are also asked for 080EH, which a FRENIC has: it answers 0 to what it does not use.
     "fr-d700": (6, 112),

@@ -121,8 +121,9 @@ TAKEN_FOR: dict[str, list[str]] = {
     "optidrive-e3": ["optidrive-e3"],
     # And this one 2520H and 2524H.
     "e510": ["e510"],
-    # And this one 091BH and 2104H.
+    # And this one 091BH and 2104H, and that one 091BH and 091FH.
     "gs2": ["gs2"],
+    "gs4": ["gs4"],
     "eds300": ["eds300"],
     "sunfar-e300": ["sunfar-e300"],
     # And these rFr and CMD: 0C82H and 2135H; this one Otr, 0C85H, and that one HMIS, 0CA8H.
@@ -165,7 +166,7 @@ SAYS = {
     "gd200a": "0107H",
 }
 
-ASKED_FOR_NO_CODE = ["gs2", "ms300", "vfd-e", "yl620"]
+ASKED_FOR_NO_CODE = ["gs2", "gs4", "ms300", "vfd-e", "yl620"]
 """Families that have something else where others have a code: what stands there is not asked for, since it is none.
 A YL620 is told by what it answers alone."""
 

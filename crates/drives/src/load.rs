@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 44] = [
+static BUILTINS: [Builtin; 45] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -183,6 +183,7 @@ static BUILTINS: [Builtin; 44] = [
     builtin!("vf-s15": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("e510": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gs2": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("gs4": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("wj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("sj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("h100": "registers.csv" "parameters.csv" "faults.csv"),

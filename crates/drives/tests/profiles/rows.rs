@@ -211,6 +211,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("wj200", 20),
         ("h100", 173),
         ("gs2", 43),
+        ("gs4", 54),
         ("j1000", 17),
         ("chv100", 24),
         ("e510", 68),

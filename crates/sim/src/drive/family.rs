@@ -30,6 +30,7 @@ mod gd3000;
 mod gd350;
 mod gd600;
 mod gs2;
+mod gs4;
 mod h100;
 mod handshake;
 mod huanyang;
@@ -160,7 +161,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 44] = [
+const FAMILIES: [fn() -> Family; 45] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -202,6 +203,7 @@ const FAMILIES: [fn() -> Family; 44] = [
     frenic::frenic,
     e510::e510,
     gs2::gs2,
+    gs4::gs4,
     h100::h100,
     optidrive::e3,
     huanyang::huanyang,
