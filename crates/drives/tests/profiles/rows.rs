@@ -234,7 +234,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("gd600-rectifier", 0),
         ("huanyang-hy", 30),
         ("md500", 26),
-        ("ms300", 17),
+        ("ms300", 23),
         ("optidrive-e3", 17),
         ("saj8000m", 14),
         ("sj200", 20),

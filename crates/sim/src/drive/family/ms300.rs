@@ -1,7 +1,7 @@
 //! Delta MS300: words at the addresses of INVT drives that mean other things.
 //!
-//! MS300 manual, pp. 795, 798, 799 and 803; the bits of 2000H from p. 514 of the CP2000 manual, those of 2101H from p. 162 of
-//! the GS3 manual, drives of the same maker. Every other address is refused with 02H.
+//! MS300 manual, pp. 795, 798, 799 and 803, and its appendix in the manual of the MH300, p. 1023; the bits of 2000H from p. 514 of the
+//! CP2000 manual, those of 2101H from p. 162 of the GS3 manual, drives of the same maker. Every other address is refused with 02H.
 //!
 //! - Assumption: bits 3-2 of 2000H are ignored, and bits 5-4 = 0 keep the direction, which is forward here. So 6, by which
 //!   a Goodrive coasts, runs it. Jogs (bits 1-0 = 3) and the words with other bits are out of range.
@@ -11,7 +11,10 @@
 //! - Assumption: there is no address that RAM alone keeps. 2000H to 2002H cannot be read, as their rows say W.
 //! - Assumption: 03H for a word out of range, 02H for what can only be read or only be written, 04H for what is not done now.
 //! - Assumption: it tells "running" (3) until it stands, and the direction that it was told. In fault it tells "stopped".
+//! - Assumption: 2109H to 210BH and 210FH are 0, and 211FH says two decimals.
 //! - Ramps have no parameters in the pages at hand; the times are fixed. A silent bus trips nothing.
+
+use std::borrow::Cow;
 
 use super::{
     Bit, Family, Faults, Flag, Kind, MAX_WORDS, Measure, Memory, Parameter, Range, Register, Roles, Shows, Speed,
@@ -77,7 +80,7 @@ const REGISTERS: &[Register] = &[
         0x2101,
         Shows::State(
             [0b00_0011, 0b01_1011, 0, 0],
-            std::borrow::Cow::Borrowed(&[Bit::Either { flag: Flag::Obeying, low: 10, yes: 1, no: 0 }]),
+            Cow::Borrowed(&[Bit::Either { flag: Flag::Obeying, low: 10, yes: 1, no: 0 }]),
         ),
     ),
     Register::read(0x2102, Shows::Measured(Measure::Setpoint, 100.0)),
@@ -85,6 +88,12 @@ const REGISTERS: &[Register] = &[
     Register::read(0x2104, Shows::Measured(Measure::Current, 100.0)),
     Register::read(0x2105, Shows::Measured(Measure::BusVoltage, 10.0)),
     Register::read(0x2106, Shows::Measured(Measure::Voltage, 10.0)),
+    Register::read(0x2109, Shows::Zero),
+    Register::read(0x210A, Shows::Zero),
+    Register::read(0x210B, Shows::Zero),
+    Register::read(0x210C, Shows::Measured(Measure::Speed, 1.0)),
+    Register::read(0x210F, Shows::Zero),
+    Register::read(0x211F, Shows::Bits(Cow::Borrowed(&[Bit::Always(0x0200)]))),
 ];
 
 const PARAMETERS: &[Parameter] = &[Parameter::new(FREQUENCY_SOURCE, 0, 9, 0), Parameter::new(COMMAND_SOURCE, 0, 5, 0)];
