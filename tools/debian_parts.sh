@@ -26,7 +26,7 @@ have_strace() {
 have_tshark() { command -v tshark >/dev/null 2>&1 || [ -x "$tools/usr/bin/tshark" ]; }
 # LinuxCNC is for Linux alone.
 have_hal() {
-    [ "$(uname -s)" != Linux ] || command -v halrun >/dev/null 2>&1 || [ -x "$tools/linuxcnc/usr/bin/vfdb_vfd" ]
+    [ "$(uname -s)" != Linux ] || command -v halrun >/dev/null 2>&1 || [ -x "$tools/linuxcnc/usr/bin/mb2hal" ]
 }
 have_prometheus() { command -v promtool >/dev/null 2>&1 || [ -x "$tools/usr/bin/promtool" ]; }
 # Debian has the server's programs beside the path, in a folder for each version.
@@ -95,7 +95,7 @@ fetch() { apt-get $as_is download "$@" || { apt-get $own update && apt-get $own 
 unpack_hal() {
     hal=$tools/linuxcnc
     mkdir -p "$hal" && dpkg-deb --fsys-tarfile "$1" | tar -x -C "$hal" --wildcards ./usr/bin/halrun ./usr/bin/halcmd ./usr/bin/rtapi_app \
-        './usr/bin/*_vfd' \
+        './usr/bin/*_vfd' ./usr/bin/mb2hal \
         './usr/lib/liblinuxcnc*' ./usr/lib/linuxcnc/realtime './usr/lib/python3/dist-packages/*hal.*' ./etc/linuxcnc &&
         chmod u-s "$hal/usr/bin/rtapi_app" &&
         sed -i "s|/usr/lib/linuxcnc|$hal&|; s|^PATH=/usr|PATH=$hal/usr|; s|sysconfdir=/etc|sysconfdir=$hal/etc|" \

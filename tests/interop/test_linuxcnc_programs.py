@@ -39,7 +39,7 @@ class Program(NamedTuple):
         family: As drivebus calls it.
         line: How it is loaded; `{port}` is where its drive is, `{ini}` a file with that.
         name: What HAL calls it.
-        speed: Its pin for the speed, in revolutions a minute, or in hertz where *counts_hertz*.
+        speed: Its pin for the speed.
         starts: Its pin that starts and stops.
         enables: Its pin that lets it, if it has one.
         runs: The words that run the motor forward, the run itself first: where, and which.
@@ -47,7 +47,9 @@ class Program(NamedTuple):
         counts: The words for 2.5 Hz and for 1.5 Hz, in the scale of the family.
         stops: The words by which it may be stopped: of drivebus, and of the program.
         settings: Pins that are set once: the address of the unit.
-        adds: Revolutions a minute that it puts on top of the speed while the motor turns.
+        halts: Its pin that stops, if that is another.
+        per_hertz: What its pin for the speed counts: revolutions a minute, tenths of a hertz, or hertz.
+        adds: What it puts on top of the speed while the motor turns.
     """
 
     family: str
@@ -61,11 +63,14 @@ class Program(NamedTuple):
     counts: tuple[int, int]
     stops: tuple[tuple[Place, int], tuple[Place, int]]
     settings: tuple[tuple[str, int], ...] = ()
-    counts_hertz: bool = False
+    halts: str | None = None
+    per_hertz: int = RPM_PER_HZ
     adds: int = 0
 
 
 RUN, DIRECTION = tables.place("coil", 0x0000), tables.place("coil", 0x0001)
+
+FORWARD, STOP = tables.place("coil", 0x0049), tables.place("coil", 0x004B)
 
 USUAL = "-S 3000 -F 50 -f 1 -d {port} -r 19200 -p none -s 1 -t 1"
 
@@ -85,7 +90,7 @@ PROGRAMS = {
     "wj200_vfd": Program(
         "wj200", "wj200_vfd --device {port} --baud 19200 --parity n --databits 8 --stopbits 1 names=wj200_vfd",
         "wj200_vfd", "commanded-frequency", "run", "enable",
-        ((RUN, 1), (DIRECTION, 0)), 0x0001, (250, 150), ((RUN, 0), (RUN, 0)), (("mbslaveaddr", 1),), counts_hertz=True,
+        ((RUN, 1), (DIRECTION, 0)), 0x0001, (250, 150), ((RUN, 0), (RUN, 0)), (("mbslaveaddr", 1),), per_hertz=1,
     ),
     # Huanyang's own protocol: 03 runs forward by 01H and stops by 08H, 05 sets the frequency in 0.01 Hz (Dema D5M
     # manual, pp. 71 and 72). Its highest frequency is 50 Hz from the factory; the program writes PD144.
@@ -94,7 +99,61 @@ PROGRAMS = {
         "speed-command", "spindle-on", "enable",
         ((0x0300, 0x01),), 0x0500, (250, 150), ((0x0300, 0x08), (0x0300, 0x08)), (("spindle-forward", 1),), adds=1,
     ),
+    # None is made for an H100: whoever has LinuxCNC writes its registers down for mb2hal. Coil 0049H runs forward,
+    # 004BH stops, 0201H counts 0.1 Hz (FluidNC, H100Spindle.md). mb2hal writes each of them over and over.
+    "mb2hal": Program(
+        "h100", "mb2hal config={ini}", "mb2hal", "speed.00.float", "forward.00.bit", None,
+        ((FORWARD, 1),), 0x0201, (25, 15), ((STOP, 1), (STOP, 1)), halts="stop.00.bit", per_hertz=10,
+    ),
 }  # fmt: skip
+
+VFD_B = """\
+[VFD-B]
+DEVICE={port}
+BAUD={baud}
+BITS=8
+PARITY=None
+STOPBITS=1
+TARGET=1
+POLLCYCLES=2
+RECONNECT_DELAY=1
+MOTOR_HZ=50
+MOTOR_RPM=3000
+"""
+MB2HAL = """\
+[MB2HAL_INIT]
+VERSION=1.1
+HAL_MODULE_NAME=mb2hal
+TOTAL_TRANSACTIONS=3
+
+[TRANSACTION_00]
+LINK_TYPE=serial
+SERIAL_PORT={port}
+SERIAL_BAUD={baud}
+SERIAL_BITS=8
+SERIAL_PARITY=none
+SERIAL_STOP=1
+MB_SLAVE_ID=1
+MB_RESPONSE_TIMEOUT_MS=500
+MB_TX_CODE=fnct_06_write_single_register
+HAL_TX_NAME=speed
+FIRST_ELEMENT=513
+NELEMENTS=1
+
+[TRANSACTION_01]
+MB_TX_CODE=fnct_05_write_single_coil
+HAL_TX_NAME=forward
+FIRST_ELEMENT=73
+NELEMENTS=1
+
+[TRANSACTION_02]
+MB_TX_CODE=fnct_05_write_single_coil
+HAL_TX_NAME=stop
+FIRST_ELEMENT=75
+NELEMENTS=1
+"""
+FILES = {"vfdb_vfd": VFD_B, "mb2hal": MB2HAL}
+"""What `{ini}` holds, where a program is told by a file."""
 
 
 class Shown(NamedTuple):
@@ -106,10 +165,9 @@ class Shown(NamedTuple):
     told: set[tuple[Place, int]]
 
 
-def carried_out(machine: SimulatedDrive, set_: Callable[[str, float], None], rpm: bool) -> Shown:
+def carried_out(machine: SimulatedDrive, set_: Callable[[str, float], None], per_hertz: int) -> Shown:
     """The script: on at 2.5 Hz, then 1.5 Hz, then off; *set_* sets a pin by what it is for."""
     states: list[tuple[str, float]] = []
-    scale = RPM_PER_HZ if rpm else 1
 
     def until(state: str, hertz: float) -> None:
         wait_until(lambda: (machine.state, round(machine.frequency, 2)) == (state, hertz), lambda: machine)
@@ -117,10 +175,10 @@ def carried_out(machine: SimulatedDrive, set_: Callable[[str, float], None], rpm
 
     machine.take_writes()
     set_("enable", 1)
-    set_("speed", 2.5 * scale)
+    set_("speed", 2.5 * per_hertz)
     set_("on", 1)
     until("forward", 2.5)
-    set_("speed", 1.5 * scale)
+    set_("speed", 1.5 * per_hertz)
     until("forward", 1.5)
     set_("on", 0)
     until("stopped", 0.0)
@@ -154,28 +212,34 @@ def test_the_same_script_makes_the_motor_do_the_same(
     words = ["--port", line.port, *UNDER_TEST, "--baud", str(BAUD), "--profile", program.family]
     session.load("drivebus", *words, "hal", "--rpm-per-hz", str(RPM_PER_HZ))
     pins = {"enable": "enable", "speed": "speed-command", "on": "spindle-on"}
-    ours = carried_out(machine, lambda pin, value: session.setp("drivebus", pins[pin], value), rpm=True)
+    ours = carried_out(machine, lambda pin, value: session.setp("drivebus", pins[pin], value), RPM_PER_HZ)
     session.unload("drivebus")
 
     with Simulator({1: program.family}, parity="N", baudrate=BAUD) as simulator:
         machine = prepare(simulator, program)
         ini = tmp_path / "drive.ini"
-        ini.write_text(
-            f"[VFD-B]\nDEVICE={simulator.port}\nBAUD={BAUD}\nBITS=8\nPARITY=None\nSTOPBITS=1\nTARGET=1\n"
-            "POLLCYCLES=2\nRECONNECT_DELAY=1\nMOTOR_HZ=50\nMOTOR_RPM=3000\n"
-        )
+        ini.write_text(FILES.get(name, "").format(port=simulator.port, baud=BAUD))
         session.load_other(program.name, program.line.format(port=simulator.port, ini=ini))
         for pin, value in program.settings:
             session.setp(program.name, pin, value)
-        others = {"enable": program.enables, "speed": program.speed, "on": program.starts}
 
         def set_(pin: str, value: float) -> None:
-            known = others[pin]
-            if known is not None:
-                session.setp(program.name, known, value - program.adds if pin == "speed" else value)
+            if pin == "speed":
+                session.setp(program.name, program.speed, value - program.adds)
+            elif pin == "enable":
+                if program.enables is not None:
+                    session.setp(program.name, program.enables, value)
+            elif program.halts is not None and value:
+                # First what stops is let go: it is said over and over.
+                session.setp(program.name, program.halts, 0)
+                session.setp(program.name, program.starts, 1)
+            else:
+                session.setp(program.name, program.starts, value)
+                if program.halts is not None:
+                    session.setp(program.name, program.halts, 1)
 
         # Not each of them ends when it is told to: the session ends it.
-        theirs = carried_out(machine, set_, rpm=not program.counts_hertz)
+        theirs = carried_out(machine, set_, program.per_hertz)
 
     assert ours.states == theirs.states
     setpoints = {(program.setpoint, count) for count in program.counts}
