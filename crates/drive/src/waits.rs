@@ -50,7 +50,8 @@ pub enum NotReached<E> {
 
 impl Unit {
     /// Waits for the time `within` until the motor runs at `hz`, or no more than `tolerance` Hz off it; `None` is the setpoint
-    /// in force. Which way it turns does not count.
+    /// in force. Where the drive tells which way it turns, that is the way it was started last: a motor that is reversed runs
+    /// through its new speed before it turns round. Who did not start it waits for either way.
     ///
     /// # Errors
     ///
@@ -63,10 +64,16 @@ impl Unit {
         within: Duration,
     ) -> Result<Status, NotReached<E>> {
         self.must_tell(if hz.is_some() { &["frequency"] } else { &["frequency", "setpoint"] })?;
+        let turns_round = |now: State| match self.record().sent().started_as {
+            Some(State::Forward) => now == State::Reverse,
+            Some(State::Reverse) => now == State::Forward,
+            _ => false,
+        };
         let is_reached = |status: &Status| {
             let off =
                 status.frequency.zip(hz.or(status.setpoint)).map(|(frequency, wanted)| (frequency - wanted).abs());
-            status.look.state.is_running() && off.is_some_and(|off| off <= tolerance + ROUNDING)
+            let state = status.look.state;
+            state.is_running() && !turns_round(state) && off.is_some_and(|off| off <= tolerance + ROUNDING)
         };
         self.wait_until(line, is_reached, line.now() + within).await
     }

@@ -8,7 +8,8 @@ use crate::status::Status;
 
 impl Drive {
     /// Waits until the motor runs at `hz`, 0 or more, or no more than `tolerance` Hz off it; `None` is the setpoint in force.
-    /// Which way it turns does not count. For `within` at most, 0 to 3600 s on the line's clock; 0 looks once.
+    /// Where the drive tells which way it turns, that is the way in which it was started last from here: a motor that is reversed runs
+    /// through its new speed before it turns round. For `within` at most, 0 to 3600 s on the line's clock; 0 looks once.
     ///
     /// Only reads, every 20 ms: whatever comes of it, the motor goes on as it was. What the last look showed is returned.
     ///

@@ -139,6 +139,40 @@ fn a_motor_stands_once_its_output_has_no_frequency() {
     assert!(matches!(until_stopped(runs_up).0, Err(NotReached::Late(_))));
 }
 
+/// GD350 operation manual, section 9.4.5: 2100H is 1 while it turns forward, and 2 in reverse.
+#[test]
+fn a_motor_that_is_reversed_is_waited_for_until_it_turns_the_other_way() {
+    // From 12 Hz forward through its new speed, 8 Hz, to a standstill after 600 ms, and on to 8 Hz in reverse.
+    let reverses = |address, millis: u64| match address {
+        STATE => Some(if millis < 600 { FORWARD } else { 2 }),
+        OUTPUT => u16::try_from(1200_u64.abs_diff(millis * 2).min(if millis < 600 { 1200 } else { 800 })).ok(),
+        SETPOINT => Some(800),
+        _ => None,
+    };
+    let wait = |started: Option<State>| {
+        let (mut script, record) = (Script::new(), Record::default());
+        record.note(|sent| sent.started_as = started);
+        let unit = call(&shipped("gd350"), &record, false);
+        let came = script
+            .carry_out(InTime(reverses), |line| async move { unit.wait_for_speed(&line, None, 0.5, 2 * SECOND).await });
+        came.map(|status| (status.look.state, status.frequency)).map_err(|why| why.to_string())
+    };
+    let (state, frequency) = wait(Some(State::Reverse)).unwrap();
+    assert_eq!(state, State::Reverse);
+    assert!(frequency.is_some_and(|frequency| frequency >= 7.5));
+    // Who did not start it, or by a jog, is not kept waiting.
+    for started in [None, Some(State::Unknown), Some(State::Forward)] {
+        assert_eq!(wait(started).unwrap().0, State::Forward, "{started:?}");
+    }
+    // One that somebody else turned round is not as it was started.
+    let (mut script, record) = (Script::new(), Record::default());
+    record.note(|sent| sent.started_as = Some(State::Reverse));
+    let unit = call(&shipped("gd350"), &record, false);
+    let came = script
+        .carry_out(InTime(keeps(5000)), |line| async move { unit.wait_for_speed(&line, None, 0.1, SECOND).await });
+    assert!(matches!(came, Err(NotReached::Late(ref status)) if status.look.state == State::Forward));
+}
+
 #[test]
 fn what_is_not_told_is_not_waited_for() {
     let untold = |name, is_trusted, hz| {
