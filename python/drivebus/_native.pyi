@@ -995,7 +995,7 @@ class Profile:
     @property
     def functions(self) -> list[int]: ...
     def requests(self) -> dict[str, Any]:
-        """`protocol`, `joined`, `across_groups`, `single_parameters`, `zeros`, `verified`, `note`, `source`."""
+        """`protocol`, `joined`, `across_groups`, `single_parameters`, `zeros`, `absent`, `verified`, `note`, `source`."""
     def serial(self) -> dict[str, Any] | None:
         """`baud_rate`, `format`, `unit` (or None), `response_delay` in seconds, `verified`, `source`."""
     @property
@@ -1142,8 +1142,8 @@ class Plan:
     @property
     def reads(self) -> list[tuple[int, int]]:
         """Address and number of words of each read."""
-    def values(self, answers: Sequence[Sequence[int]], /) -> list[int | float]:
-        """The value of each name, in their order, out of the words that each read brought.
+    def values(self, answers: Sequence[Sequence[int]], /) -> list[int | float | None]:
+        """The value of each name, in their order, out of the words that each read brought; None where it has nothing.
 
         Ints where the drive counts or names, floats where it measures.
         """
@@ -1219,7 +1219,7 @@ class Batch:
     """Samples that were taken out of a `Poller`."""
 
     def __len__(self) -> int: ...
-    def samples(self) -> list[tuple[int, float, float, int, list[int | float] | None, Exception | None]]:
+    def samples(self) -> list[tuple[int, float, float, int, list[int | float | None] | None, Exception | None]]:
         """Each sample: its target by number, Unix times of request and answer, beats missed, values, error; or None."""
     def rows(self, target: int, /) -> bytearray:
         """Those of one target as doubles in native order: the two times and the values, NaN for what is missing."""

@@ -170,7 +170,9 @@ async fn values_of<E>(
     for span in plan.reads() {
         words.extend(line.read(Read::words(unit, span.place(), span.count).urgent(is_urgent)).await?);
     }
-    Ok(plan.values(&words).filter_map(|(_, value)| value).map(|value| (value.to_f64(), value.count())).collect())
+    // Where one of them is not there, none can be told from another.
+    let values: Option<Vec<_>> = plan.told(&words).map(|(_, value)| value).collect();
+    Ok(values.into_iter().flatten().map(|value| (value.to_f64(), value.count())).collect())
 }
 
 #[cfg(test)]

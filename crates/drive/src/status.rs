@@ -47,10 +47,10 @@ impl Unit {
         let of_role = |role| self.profile().role(role).filter(|entry| self.rule().read(entry).is_ok());
         let told = ["frequency", "setpoint"].map(|role| of_role(role).map(Entry::name));
         let names: Vec<_> = told.into_iter().flatten().collect();
-        let values = self.read_values(line, &names).await?;
+        let values = self.read_told(line, &names).await?;
         // The state tells the direction; some families have it in the sign as well.
-        let mut came = values.values.iter().map(|value| value.to_f64().abs());
-        let [frequency, setpoint] = told.map(|name| name.and_then(|_| came.next()));
+        let mut came = values.values.iter().map(|value| value.map(|value| value.to_f64().abs()));
+        let [frequency, setpoint] = told.map(|name| name.and_then(|_| came.next().flatten()));
         let asked = if self.is_blind() { values.asked } else { look.asked };
         Ok(Status { look, frequency, setpoint, asked })
     }

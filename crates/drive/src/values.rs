@@ -14,9 +14,9 @@ use crate::unit::Unit;
 /// Values that were read, and when.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct Values {
+pub struct Values<V = Value> {
     /// The values, in the order of their names.
-    pub values: Vec<Value>,
+    pub values: Vec<V>,
     /// What the words mean, as the drive is set: units and choices are in it.
     pub profile: Arc<Profile>,
     /// When the first was asked for, in Unix time; zero where nothing was.
@@ -43,6 +43,14 @@ pub enum NotRead<E> {
     /// Nobody knows what it means.
     #[error("{0}")]
     NotSettled(NotSettled<E>),
+    /// The drive has nothing there, and says so by a word.
+    #[error("the drive has no {name}: it answered {word:04X}H, which says so; leave {name} out")]
+    Absent {
+        /// What it was called.
+        name: String,
+        /// The word.
+        word: u16,
+    },
     /// The line failed, or the unit refused.
     #[error("{0}")]
     Failed(E),
@@ -55,6 +63,24 @@ impl Unit {
     ///
     /// [`NotRead`].
     pub async fn read_values<E: LineError>(&self, line: &Mailbox<E>, names: &[&str]) -> Result<Values, NotRead<E>> {
+        let told = self.read_told(line, names).await?;
+        let word = told.profile.requests().absent.unwrap_or_default();
+        let absent = |name: &str| NotRead::Absent { name: name.to_owned(), word };
+        let values = names.iter().zip(told.values).map(|(name, value)| value.ok_or_else(|| absent(name)));
+        let (profile, asked, answered) = (told.profile, told.asked, told.answered);
+        Ok(Values { values: values.collect::<Result<_, _>>()?, profile, asked, answered })
+    }
+
+    /// As [`read_values`](Self::read_values), and none of what the drive says that it has not.
+    ///
+    /// # Errors
+    ///
+    /// [`NotRead`], but for [`Absent`](NotRead::Absent).
+    pub(crate) async fn read_told<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        names: &[&str],
+    ) -> Result<Values<Option<Value>>, NotRead<E>> {
         for name in names {
             let entry = self.profile().resolve(name).map_err(NotRead::Unknown)?;
             let may_not = |why: String| NotRead::MayNot { name: (*name).to_owned(), why };
@@ -67,7 +93,7 @@ impl Unit {
         let plan = profile.compile(&entries.iter().map(AsRef::as_ref).collect::<Vec<_>>()).ok();
         let line = line.taken_for(self.address(), self.family());
         let came = read_planned(plan.as_ref(), &line, self.address(), false).await.map_err(NotRead::Failed)?;
-        let values = plan.iter().flat_map(|plan| plan.values(&came.words)).filter_map(|(_, value)| value).collect();
+        let values = plan.iter().flat_map(|plan| plan.told(&came.words)).map(|(_, value)| value).collect();
         Ok(Values { values, profile: Arc::clone(profile), asked: came.asked, answered: came.answered })
     }
 }

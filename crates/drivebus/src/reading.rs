@@ -89,9 +89,9 @@ impl Reading {
     }
 
     /// The values in `words`, which holds those of all reads, one read after the other. A value whose word is missing is
-    /// missing too.
+    /// missing too, and one of which the drive says that it has it not.
     pub fn values(&self, words: &[u16]) -> Values {
-        let values = self.0.plan.values(words).map(|(_, value)| value).collect();
+        let values = self.0.plan.told(words).map(|(_, value)| value).collect();
         Values { planned: Arc::clone(&self.0), values }
     }
 }
@@ -113,7 +113,7 @@ impl Values {
 
     /// The only one.
     pub(crate) fn only(&self) -> Result<Value, Error> {
-        let missing = || Error::of(ErrorKind::BadAnswer, "its words have not come");
+        let missing = || Error::of(ErrorKind::BadAnswer, "the drive says that it has nothing there");
         self.values.first().copied().flatten().ok_or_else(missing)
     }
 

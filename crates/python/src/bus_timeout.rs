@@ -8,7 +8,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
-use crate::errors::refuse;
+use crate::errors::{Class, refuse};
 use crate::not_done::{Told, raised, settled_told};
 use crate::not_kept::{held, not_kept, not_kept_told};
 use crate::rule::Rule;
@@ -145,6 +145,10 @@ fn read_told(py: Python<'_>, why: NotRead<Failed>) -> PyResult<Told> {
         NotRead::MayNot { name, .. } => ("may_not", name.into_py_any(py)?),
         NotRead::NotSettled(why) => ("not_settled", settled_told(py, why)?.into_py_any(py)?),
         NotRead::Failed(error) => ("failed", raised(py, error)?),
+        NotRead::Absent { name, word } => {
+            let message = format!("the drive has no {name}: it answered {word:04X}H, which says so");
+            ("failed", Class::BadAnswer.raise(message, |_| Ok(())).into_value(py).into_any())
+        }
         why => return Err(unknown(&why)),
     })
 }

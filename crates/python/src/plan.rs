@@ -47,7 +47,7 @@ impl Plan {
             return Err(bad_argument(format!("answers of {came} words, for reads of {asked} words")));
         }
         let words = answers.concat();
-        let values = self.core.values(&words).filter_map(|(quantity, value)| Some(number(py, quantity, value?)));
+        let values = self.core.told(&words).map(|(quantity, value)| value.map(|value| number(py, quantity, value)));
         PyList::new(py, values.collect::<Vec<_>>())
     }
 

@@ -177,7 +177,7 @@ impl Batch {
             let or_nan = |number: f64| if is_missing { f64::NAN } else { number };
             match self.meanings.get(target) {
                 Some(Meaning::Values(plan)) => {
-                    plan.values(words).for_each(|(_, value)| put(or_nan(value.map_or(f64::NAN, Value::to_f64))));
+                    plan.told(words).for_each(|(_, value)| put(or_nan(value.map_or(f64::NAN, Value::to_f64))));
                 }
                 Some(Meaning::Words(count)) => {
                     words.iter().take(*count).for_each(|&word| put(or_nan(f64::from(word))));
@@ -202,7 +202,7 @@ impl Batch {
     fn values<'py>(&self, py: Python<'py>, sample: &PollSample, words: &[u16]) -> PyResult<Bound<'py, PyList>> {
         match self.meanings.get(sample.target) {
             Some(Meaning::Values(plan)) => {
-                let values = plan.values(words).filter_map(|(quantity, value)| Some(number(py, quantity, value?)));
+                let values = plan.told(words).map(|(quantity, value)| value.map(|value| number(py, quantity, value)));
                 PyList::new(py, values.collect::<Vec<_>>())
             }
             Some(Meaning::Words(count)) => {

@@ -88,6 +88,7 @@ pub(crate) fn requests<'py>(py: Python<'py>, requests: &Requests) -> Table<'py> 
     dict.set_item("across_groups", requests.across_groups)?;
     dict.set_item("single_parameters", requests.single_parameters)?;
     dict.set_item("zeros", PyTuple::new(py, &requests.zeros)?)?;
+    dict.set_item("absent", requests.absent)?;
     dict.set_item("verified", requests.verified)?;
     dict.set_item("note", &requests.note)?;
     dict.set_item("source", &requests.source)?;

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, overload
 
 from drivebus import _native, checks
 from drivebus.attribute_mapping import Named
-from drivebus.errors import BadArgument, DrivebusError, Refused
+from drivebus.errors import BadAnswer, BadArgument, DrivebusError, Refused
 from drivebus.line.addresses import Addresses
 from drivebus.line.units import units_of
 from drivebus.profile import Profile
@@ -257,13 +257,18 @@ class Batch(Sequence[Sample[Key]], Generic[Key]):
         time: float,
         answered: float,
         late: int,
-        values: list[Value] | None,
+        came: list[Value | None] | None,
         missing: Exception | None,
     ) -> Sample[Key]:
-        target = self._targets[index]
-        if values is not None and target.plan is not None:
-            values = target.plan.named(values)
+        target, values = self._targets[index], None
         error = missing if isinstance(missing, DrivebusError) else None
+        if came is not None and target.plan is None:
+            values = [word for word in came if word is not None]
+        elif came is not None and target.plan is not None:
+            try:
+                values = target.plan.named(came, unit=target.unit)
+            except BadAnswer as absent:
+                error = absent
         if isinstance(error, Refused) and target.profile is not None:
             error.name, error.meaning = target.profile.exception(error.code)
         return Sample(target, time, answered, late, values, error)

@@ -70,7 +70,7 @@ async def snapshot(unit: DriveView, *names: str, verify: bool = False, unverifie
             came, sent, ended = await unit.bus.ask_stamped(Read.at(unit.address, place, count, verify=verify))
         started = started if answers else sent
         answers.append(came)
-    values = dict(zip(plan.names, plan.values(answers), strict=True))
+    values = dict(zip(plan.names, plan.values(answers, unit=unit.address), strict=True))
     return Snapshot(values, plan.units, started, ended - started)
 
 

@@ -63,6 +63,7 @@ class RequestRules(_Fact):
         across_groups: Whether a read may leave its group of parameters.
         single_parameters: Whether a read may have one parameter and no more.
         zeros: The high bytes of addresses under which each is answered, with 0 where there is nothing.
+        absent: A word that the drive has where it has nothing; None where it has none.
         verified: Whether a document of this very family prints it.
         note: What else is known; says what is assumed where it is not verified.
         source: The document that says so.
@@ -73,6 +74,7 @@ class RequestRules(_Fact):
     across_groups: bool
     single_parameters: bool
     zeros: tuple[int, ...]
+    absent: int | None
     verified: bool
     note: str
     source: str

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from drivebus import _native
+from drivebus.errors import BadAnswer
 
 if TYPE_CHECKING:
     from drivebus.values import Description, Value
@@ -46,15 +47,32 @@ class ReadPlan:
             if row.choices
         ]
 
-    def values(self, answers: Sequence[Sequence[int]]) -> list[Value]:
-        """The value of each name, in their order, out of the words that each read brought."""
-        return self.named(self.native.values(answers))
+    def values(self, answers: Sequence[Sequence[int]], *, unit: int | None = None) -> list[Value]:
+        """The value of each name, in their order, out of the words that each read brought.
 
-    def named(self, values: list[Value]) -> list[Value]:
-        """*values*, with a `Choice` for each that the profile has a label for; the list itself is changed."""
+        Raises:
+            BadAnswer: Words of *unit* that stand for nothing: it has no such register.
+        """
+        return self.named(self.native.values(answers), unit=unit)
+
+    def named(self, values: Sequence[Value | None], *, unit: int | None = None) -> list[Value]:
+        """*values*, with a `Choice` for each that the profile has a label for.
+
+        Raises:
+            BadAnswer: One is None: *unit* says that it has no such register.
+        """
+        told = [value for value in values if value is not None]
+        if len(told) < len(values):
+            absent = ", ".join(name for name, value in zip(self.names, values, strict=True) if value is None)
+            who = "the drive" if unit is None else f"unit {unit}"
+            raise BadAnswer(
+                f"{who} has no {absent}: the word that it answered stands for nothing in its family. "
+                f"Leave {absent} out",
+                unit=unit,
+            )
         for index, labels in self._labels:
-            value = values[index]
+            value = told[index]
             # A float is never a choice, although one may equal its number.
             if isinstance(value, int):
-                values[index] = labels.get(value, value)
-        return values
+                told[index] = labels.get(value, value)
+        return told

@@ -48,3 +48,11 @@ fn what_may_not_be_read_is_left_out() {
         assert_eq!(status.frequency.is_some(), is_trusted);
     }
 }
+
+/// Altivar 71 integrated Modbus (Schneider 1755863), p. 39. rFr is at 3202 and FrH at 3203 (AAV49428, p. 96).
+#[test]
+fn a_frequency_that_the_drive_has_not_is_left_out() {
+    let (status, _) = status("atv71", &[(3201, 0x0027), (3202, 0x8000), (3203, 125)], true);
+    let status = status.unwrap();
+    assert_eq!((status.frequency, status.setpoint), (None, Some(12.5)));
+}

@@ -65,3 +65,23 @@ fn a_refusal_is_told() {
     let came = Script::new().carry_out(refusing, |line| async move { unit.read_values(&line, &["P00.11"]).await });
     assert!(matches!(came, Err(NotRead::Failed(_))));
 }
+
+/// Altivar 71 integrated Modbus (Schneider 1755863), p. 39: 8000H is where the drive has nothing. LCR counts 0.1 A and Otr 0.1 %
+/// (AAV49428, pp. 96 and 97); ETA, of bits, is whatever it says.
+#[test]
+fn the_word_of_a_family_for_nothing_is_no_value() {
+    let names = &["output_current", "output_torque"];
+    let (values, _) = read("atv71", &[(3204, 57), (3205, 0x8001)], names, true);
+    assert_eq!(shown(&values.unwrap()), ["5.7", "-3276.7"]);
+    let (values, script) = read("atv71", &[(3204, 57), (3205, 0x8000)], names, true);
+    let why = values.unwrap_err();
+    assert_eq!(
+        why.to_string(),
+        "the drive has no output_torque: it answered 8000H, which says so; leave output_torque out"
+    );
+    assert_eq!(script.asked.len(), 1);
+    let (values, _) = read("atv71", &[(3201, 0x8000)], &["status_word"], true);
+    assert_eq!(shown(&values.unwrap()), ["32768"]);
+    // A GD350 has no such word.
+    assert_eq!(shown(&read("gd350", &[(0x3004, 0x8000)], &["output_current"], false).0.unwrap()), ["3276.8"]);
+}

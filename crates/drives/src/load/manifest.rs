@@ -157,6 +157,9 @@ pub(super) struct Requests {
     /// The high bytes of addresses under which a read is answered, with 0 where there is nothing: `[0x00, 0x07]`.
     #[serde(default)]
     pub(super) zeros: Vec<u8>,
+    /// A word that the drive has where it has nothing, among others of a read or alone: `0x8000`. It is no value of anything
+    /// that has neither bits nor choices.
+    pub(super) absent: Option<u16>,
     /// Whether a document of this very family prints it.
     #[serde(default = "yes")]
     pub(super) verified: bool,

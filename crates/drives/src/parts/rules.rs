@@ -64,6 +64,8 @@ pub struct Requests {
     pub single_parameters: bool,
     /// The high bytes of addresses of holding registers under which each is answered, with 0 where there is nothing.
     pub zeros: Vec<u8>,
+    /// A word that stands for nothing, where the drive has it instead of a value that it does not know.
+    pub absent: Option<u16>,
     /// Whether documents of this family print all of this.
     pub verified: bool,
     /// What to know about it; says what is assumed where it is not verified.

@@ -24,6 +24,8 @@ struct Field {
     /// Where its first word is.
     position: usize,
     quantity: Quantity,
+    /// The word that stands for nothing there.
+    absent: Option<u16>,
 }
 
 impl Profile {
@@ -49,7 +51,9 @@ impl Profile {
             .iter()
             .map(|entry| {
                 let position = position(self.read_address(entry)?);
-                Ok(Field { position, quantity: entry.quantity().clone() })
+                let is_number = entry.words() == 1 && entry.bits().is_empty() && entry.quantity().choices().is_empty();
+                let absent = self.requests.absent.filter(|_| is_number);
+                Ok(Field { position, quantity: entry.quantity().clone(), absent })
             })
             .collect::<Result<_, AccessError>>()?;
         Ok(ReadPlan { reads, fields })
@@ -77,6 +81,14 @@ impl ReadPlan {
                 words.get(field.position).map(|&word| quantity.decode(word))
             };
             (quantity, value)
+        })
+    }
+
+    /// As [`values`](Self::values), and none of an entry whose word is what the drive has where it has nothing.
+    pub fn told(&self, words: &[u16]) -> impl Iterator<Item = (&Quantity, Option<Value>)> {
+        self.fields.iter().zip(self.values(words)).map(|(field, (quantity, value))| {
+            let is_absent = field.absent.is_some() && words.get(field.position).copied() == field.absent;
+            (quantity, value.filter(|_| !is_absent))
         })
     }
 }

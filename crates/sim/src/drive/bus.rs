@@ -156,8 +156,19 @@ impl Drive {
                 self.check_groups(address, count)?;
                 self.check_single(address, count)?;
                 let words = words.get_mut(..usize::from(count)).ok_or(Refusal::Structure)?;
+                let absent = self.family().roles.absent;
+                let mut has_any = absent.is_none_or(|absent| absent.alone);
                 for (word, offset) in words.iter_mut().zip(0..) {
-                    *word = self.word(spot(table, address.wrapping_add(offset)))?;
+                    *word = match (self.word(spot(table, address.wrapping_add(offset))), absent) {
+                        (Err(Refusal::Address | Refusal::Unreadable), Some(absent)) => absent.word,
+                        (read, _) => {
+                            has_any = true;
+                            read?
+                        }
+                    };
+                }
+                if !has_any {
+                    return Err(Refusal::Address);
                 }
                 return Answer::read_of(table, words).map_err(|_| Refusal::Structure);
             }

@@ -58,7 +58,7 @@ use super::machine::Command;
 use super::refusal::Refusal;
 pub(crate) use handshake::Handshake;
 pub(crate) use register::{Bit, Bounds, Count, Flag, Measure, Parameter, Range, Register, Shows};
-pub(crate) use roles::{Deciding, OnSilence, OtherWords, Roles, Scaled, Silence, Speed, SpeedScale, SpeedUnit};
+pub(crate) use roles::{Absent, Deciding, OnSilence, OtherWords, Roles, Scaled, Silence, Speed, SpeedScale, SpeedUnit};
 pub(crate) use unlisted::unlisted;
 
 /// One family.

@@ -195,7 +195,6 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "atv12",
         "atv600",
         "atv71",
-        "atv320",
         "v20",
         "acs355",
         "acs580",
@@ -211,6 +210,8 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
     ] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }
+    // It refuses no read.
+    assert_eq!(Bench::of("atv320").read::<1>(0x2103), [0x8000]);
     // It has a code of its own for that.
     Bench::of("eds300").refuses_read(0x2103, 1, 0x03);
     // Their output frequency stands there.
@@ -382,4 +383,14 @@ fn a_rectifier_feeds_and_drives_no_motor() {
         let refused = bench.drive().set_load(0.5).unwrap_err().to_string();
         assert_eq!(refused, format!("{family} drives no motor, so it has no load to set"));
     }
+}
+
+/// Altivar 71 integrated Modbus (Schneider 1755863), p. 39. 3209, thd, is in the list of parameters (S383, V6.7), and 3210 is not.
+#[test]
+fn an_altivar_71_has_8000h_for_what_it_has_not_among_others_of_a_read() {
+    let mut bench = Bench::of("atv71");
+    let [thermal, absent] = bench.read(3209);
+    assert_ne!(thermal, 0x8000);
+    assert_eq!(absent, 0x8000);
+    bench.refuses_read(3210, 1, 0x02);
 }

@@ -102,6 +102,8 @@ def _line(profile: drivebus.Profile) -> list[str]:
     if requests.zeros:
         groups = ", ".join(f"{group:02X}xxH" for group in requests.zeros)
         lines.append(f"what is not there reads as 0 in {groups}")
+    if requests.absent is not None:
+        lines.append(f"what is not there reads as {requests.absent:04X}H")
     serial = profile.serial()
     if serial is None:
         return [*lines, "its factory setting is not known"]

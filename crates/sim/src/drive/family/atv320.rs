@@ -4,10 +4,11 @@
 //! file of product 320 and the list beside it (hilch/ac_invlib): the addresses, STFR at 3281, CHCF from 1 to 3, and the numbers of the
 //! faults, OLF = 17 and SLF1 = 5. From programs that quote its Modbus manual (NVE41308): 03H, 06H and 10H, 63 words.
 //!
+//! - Where it has nothing it says 8000H, and refuses no read (robotsmith/Arduino_ATV320_library).
 //! - Assumption: all that an Altivar 71 does else, its I/O profile, and that a run waits for the first setpoint.
 //! - Assumption: 080FH is none of its words. Exceptions are those of the specification.
 
-use super::{Family, Parameter, Register, Shows, atv71};
+use super::{Absent, Family, Parameter, Register, Roles, Shows, atv71};
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::by_the_specification;
 
@@ -26,6 +27,7 @@ pub(crate) fn atv320() -> Family {
         elsewhere: also(SPEED_COMMAND).chain(also(SCANNER)).collect(),
         registers: [&sister.registers[..], &[Register::read(3281, Shows::Zero)]].concat(),
         parameters: [&sister.parameters[..], &[Parameter::new(CONTROL_MODE, 1, 3, 1).at_standstill()]].concat(),
+        roles: Roles { absent: Some(Absent { word: 0x8000, alone: true }), ..sister.roles },
         ..sister
     }
 }

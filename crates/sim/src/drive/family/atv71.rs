@@ -5,7 +5,8 @@
 //! 23H and 27H; its bit 4 is the mains, bit 9 is 1 while the bus commands, bit 15 the other way round (AAV49428, pp. 25 to 30). A run is
 //! obeyed once the setpoint has been written, and one that comes before waits for it (pp. 26 and 62). With DOTD at 0 the motor coasts
 //! when the run is taken back (p. 26). LFt (7121) keeps its number after a reset (p. 112). 08H is there, and a word that can only be read
-//! is refused with 04H (1755863, pp. 30 and 39).
+//! is refused with 04H (1755863, pp. 30 and 39). Words that it has not are 8000H among others of a read, which is refused with 02H where
+//! it has none of them (p. 39).
 //!
 //! - Assumption: DOTD is 1, the ramp, as the list says; by the manual it is 0 from the factory (p. 131).
 //! - Assumption: its mains are on, and somebody has set SLL to 0, so that a silent bus does nothing; from the factory it is 1.
@@ -21,12 +22,11 @@
 //!   Assumption: no other bit has a meaning then, and 8601 and 12761 take the same words.
 //! - Assumption: 50.0 Hz is the frequency in FrS, HSP and at the keypad, tFr is 60.0 Hz (the latter is printed, p. 85). A value of HSP above tFr
 //!   is refused, where a real one cuts it. A negative setpoint turns the other way, though rIn is not looked at.
-//! - Assumption: words that it has not are refused with 02H, also among others of a read; a real one says 8000H for those (1755863, p. 40).
 //! - Assumption: HMIS shows rdY (2) or FLt (23) and nothing else. ACC and dEC are 3.0 s.
 
 use super::{
-    Bit, Bounds, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, OtherWords, Parameter, Range,
-    Register, Roles, Scaled, Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
+    Absent, Bit, Bounds, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, OtherWords, Parameter,
+    Range, Register, Roles, Scaled, Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ,
 };
 use crate::drive::machine::{Command, Direction};
 use crate::drive::refusal::{Refusal, by_the_specification};
@@ -74,6 +74,7 @@ pub(crate) fn atv71() -> Family {
         factory: &[],
         capped: &[],
         roles: Roles {
+            absent: Some(Absent { word: 0x8000, alone: false }),
             obeys: vec![(CONTROL_MODE, 1), (SETPOINT_SOURCE, MODBUS)],
             other_words: Some(OtherWords { set_by: (CONTROL_MODE, 3), decode: by_inputs }),
             speed: Some(Speed { register: SETPOINT, unit: None, usual: SPEED }),

@@ -69,6 +69,7 @@ pub(crate) fn gd350() -> Family {
             runs_after: &[],
             other_words: None,
             reads_single_parameters: false,
+            absent: None,
         },
         delay: USUAL_DELAY,
         max_hertz: USUAL_MAX_HZ,

@@ -19,7 +19,7 @@ use drivebus_drives::{
 use drivebus_rtu::huanyang::Protocol;
 
 use super::{
-    Bit, Bounds, Deciding, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, Parameter, Range,
+    Absent, Bit, Bounds, Deciding, Family, Faults, Flag, Handshake, Kind, Measure, Memory, OnSilence, Parameter, Range,
     Register, Roles, Scaled, Shows, Silence, Speed, SpeedScale, SpeedUnit, USUAL_DELAY, USUAL_MAX_HZ, register,
 };
 use crate::drive::machine::{Command, Direction};
@@ -63,6 +63,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         max_frequency,
         handshake,
         reads_single_parameters: profile.requests().single_parameters,
+        absent: profile.requests().absent.map(|word| Absent { word, alone: true }),
         protocol: match profile.requests().protocol {
             drivebus_drives::Protocol::Huanyang => Protocol::Huanyang,
             _ => Protocol::Modbus,

@@ -50,6 +50,16 @@ pub(crate) struct Roles {
     pub(crate) other_words: Option<OtherWords>,
     /// Whether a read may have one parameter and no more.
     pub(crate) reads_single_parameters: bool,
+    /// The word that a read has where the drive has nothing, instead of being refused.
+    pub(crate) absent: Option<Absent>,
+}
+
+/// What a drive answers where it has nothing.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Absent {
+    pub(crate) word: u16,
+    /// Whether also where the read has nothing else, which others refuse.
+    pub(crate) alone: bool,
 }
 
 /// A control profile of the drive in which its commands mean something else, and no words come before a run.
@@ -203,5 +213,6 @@ impl Roles {
         runs_after: &[],
         other_words: None,
         reads_single_parameters: false,
+        absent: None,
     };
 }
