@@ -995,7 +995,7 @@ class Profile:
     @property
     def functions(self) -> list[int]: ...
     def requests(self) -> dict[str, Any]:
-        """`protocol`, `joined`, `across_groups`, `single_parameters`, `zeros`, `absent`, `verified`, `note`, `source`."""
+        """What is known beside lengths: `protocol`, `joined`, `across_groups`, `single_parameters`, and more."""
     def serial(self) -> dict[str, Any] | None:
         """`baud_rate`, `format`, `unit` (or None), `response_delay` in seconds, `verified`, `source`."""
     @property

@@ -37,17 +37,17 @@ P00.03  0003H    Maximum frequency  10.00-400.00                        50.00
 """
 BY_TABLES = [
     *("Example Drives EX-1", "EX-1 manual, 3rd edition"),
-    *("registers.csv", "41", "-", *PARAMETERS.splitlines(), ".", "42", ""),
+    *("registers.csv", "41", "-", *PARAMETERS.splitlines(), ".", "42", "y", ""),
     *("command", "41", "1", "2", "5", "6", "7", "y"),  # pages are offered again
     *("speed_setpoint", "1100H", "", "number", "1", "2", "3", "4", "output_frequency", "1101H"),
-    *("P00.01=2", "42", "", "y", "6", "12", "40", "9600 8N1 1", "39"),
+    *("P00.01=2", "", "", "", "P00.03", "", "6", "12", "40", "9600 8N1 1", "39"),
 ]
 BY_HAND = [
     *("Example Drives EX-2", "EX-2 manual", ""),
     *("2000H", "7", "12H", "22h", "0x1", "", "2002H=2", "7", "y"),
     *("2001H", "7", "0.01 %", "P01.00", "0100H", "8", "0.1 Hz", "5 400", "8"),
     *("2100H", "9", "bits", "15=1", "1-0=1", "1-0=2", "1-0=0"),
-    *("2103H", "9", "0.1 Hz", "", "", "n", "16", "1", "10", ""),
+    *("2103H", "9", "0.1 Hz", "", "", "", "", "all", "16", "1", "10", ""),
 ]
 
 
@@ -137,15 +137,16 @@ def test_a_motor_turns_by_it_and_stops(there: Path, answers: list[str]) -> None:
         (21, "2001H", "2001H is the register of another answer"),
         (15, "P/1", '"P/1" is no code of a parameter'),
         (18, "0.1 %", '"0.1 %" is no 1, 0.1, 0.01'),
-        (19, "400 10", "no lowest and highest frequency"),
+        (19, "400 10", "no lowest and highest value"),
         (24, "17=1", "a word has the bits 0 to 15"),
         (24, "1=2", "does not fit"),
         (24, "running", "is no bit and what it is"),
         (32, "P00.01", "no parameter and value"),
-        (34, "3", "is not one of"),
-        (35, "0", "is not in the range"),
-        (37, "9600 7E1 1", "no speed, format and unit"),
-        (37, "9600 8N1 248", "no speed, format and unit"),
+        (35, "P9", '"p9" is none of P01.00'),
+        (36, "3", "is neither 6, 16"),
+        (37, "0", "is not in the range"),
+        (39, "9600 7E1 1", "no speed, format and unit"),
+        (39, "9600 8N1 248", "no speed, format and unit"),
     ],
 )
 def test_a_wrong_answer_is_named_and_asked_again(there: Path, place: int, wrong: str, said: str) -> None:
@@ -277,7 +278,7 @@ C-21  40790     Deceleration time  0.1-600.0 s (0.1 s)                          
         *("40514", "89", "20000 = C-10", "89"),
         *("40545", "89", "bits", "7=1", "3-2=01", "3-2=10", "3-2=00"),
         *("40546", "89", "0.1 Hz", "40549", "89"),
-        *("C-02=3", "90", "speed_source=4", "90", "", "y", "6", "4", "88", "19200 8E1 7", "88"),
+        *("C-02=3", "speed_source=4", "", "C-21", "C-10", "", "", "", "6", "4", "88", "19200 8E1 7", "88"),
     ]
     done = asked(there, answers)
     assert done.exit_code == 0, done.output
@@ -295,3 +296,147 @@ C-21  40790     Deceleration time  0.1-600.0 s (0.1 s)                          
         assert line.drive(7).writes()[-1][1:] == (0x0200, 0x0041)
         assert bus.read(7, 0x0201, 1) == [4167]
         drive.stop()
+
+
+PRINTED = """\
+Register  Acc  Meaning                 Unit / bits
+40101     R/W  Control word            bit 0 run
+                                       bit 1 direction (1 counter-clockwise)
+                                       bit 2 release; bit 7 fault reset
+40102     R/W  Speed reference         0.1 Hz, 0 ... 3-05
+40111     R    Status word             bit 1 running, bit 2 counter-clockwise,
+                                       bit 3 fault
+40112     R    Output frequency        0.1 Hz
+40113     R    Output current          0.01 A
+40114     R    Motor torque            0.1 %, signed
+40116     R    Active fault            0 none, else see page 11
+"""
+SETTINGS = """\
+No.   Register  Name                    Range            Ex works  Change
+1-01  41101    Command source          0 keypad         1         stopped
+                                       1 terminals
+                                       2 bus
+1-02  41102    Reference source        0 potentiometer  0         stopped
+                                       1 analogue input
+                                       3 bus
+3-01  41301    Acceleration time       0.1 ... 600.0 s  5.0       any time
+3-02  41302    Deceleration time       0.1 ... 600.0 s  5.0       any time
+               (from 3-05 to 0 Hz)
+3-05  41305    Maximum frequency       10.0 ... 400.0 Hz 60.0     stopped
+7-01  41701    Bus supervision         0.0 ... 60.0 s   0.0       any time
+7-02  41702    Reaction to silence     0 none 1 stop    1         any time
+                                       2 trip
+"""
+LIST_OF_FAULTS = """\
+1 E.OC  overcurrent          5 E.OH  heat sink too hot
+2 E.OU  overvoltage          9 E.bUS bus silent longer than 7-01
+"""
+AS_PRINTED = [
+    *("Corvan CV-2", "CV-2 supplement", "-", *PRINTED.splitlines(), ".", "6"),
+    *("-", *SETTINGS.splitlines(), ".", "8", "y", ""),
+    *("control_word", "6", "bit 0 and bit 2", "bits 0, 1, 2", "bit 2", "0", "bits 2 7", "y"),
+    *("speed_reference", "status_word", "", "bits", "3=1", "1=1,2=0", "1=1,2=1", "1=0"),
+    *("output_frequency", "active_fault", "1-01=2", "1-02=3", "", "3-02", "3-05", "7-01", "7-02", "1", ""),
+    *("-", *LIST_OF_FAULTS.splitlines(), ".", "11", "6, 16", "16", "4", "19200 8N1 5", "4"),
+]
+"""A manual whose tables are pasted as it prints them: lines that go on, values without signs, a gap of one blank."""
+
+
+def test_a_table_is_pasted_as_it_is_printed(there: Path) -> None:
+    done = asked(there, AS_PRINTED)
+    assert done.exit_code == 0, done.output
+    assert "is sound: 7 registers, 7 parameters, 4 faults." in done.stdout
+    profile = drivebus.Profile.load(there)
+    assert profile.commands() == {"run_forward": 5, "run_reverse": 7, "stop": 4, "coast": 0, "reset_fault": 0x84}
+    assert profile.functions == [3, 6, 16]
+    speed = profile.describe("speed_reference")
+    assert (speed.address, speed.unit, speed.scale, speed.high_from) == (101, "Hz", 10, "3-05")
+    torque = profile.describe("motor_torque")
+    assert (torque.unit, torque.scale, torque.signed) == ("%", 10, True)
+    source = profile.describe("1-01")
+    assert (dict(source.choices), source.access, source.default) == ({0: "keypad", 1: "terminals", 2: "bus"}, "stop", 1)
+    ramp = profile.describe("3-02")
+    assert (ramp.address, ramp.unit, ramp.scale, ramp.high, ramp.access, ramp.default) == (
+        1301,
+        "s",
+        10,
+        600.0,
+        "run",
+        5.0,
+    )
+    assert dict(profile.describe("7-02").choices) == {0: "none", 1: "stop", 2: "trip"}
+    assert profile.describe("3-05").default == 60.0
+    text = (there / "profile.toml").read_text(encoding="utf-8")
+    assert '[ramp]\ndeceleration = "3-02"\nstart = "3-05"' in text
+    assert '[watchdog]\ntimeout = "7-01"\naction = "7-02"\nstop = 1' in text
+    assert [(profile.fault(code).mnemonic, profile.fault(code).label) for code in (1, 5, 9)] == [
+        ("E.OC", "overcurrent"),
+        ("E.OH", "heat sink too hot"),
+        ("E.bUS", "bus silent longer than 7-01"),
+    ]
+    with Simulator({5: there}, transport="process", clock="virtual") as line, drivebus.Bus(line) as bus:
+        drive = bus.drive(5, profile=there)
+        drive.prepare_control(store=True)
+        drive.run(12.5)
+        drive.wait_for_speed()
+        # Both words in one request.
+        assert [each[1:] for each in line.drive(5).writes()[-2:]] == [(100, 5), (101, 125)]
+        assert bus.read(5, 101, 1) == [125]
+        drive.run(8.0, reverse=True)
+        drive.wait_for_speed()
+        assert line.drive(5).state == "reverse"
+        assert line.drive(5).frequency == pytest.approx(-8.0, abs=0.1)
+        drive.stop()
+        drive.wait_until_stopped()
+
+
+def test_an_answer_is_taken_back(there: Path) -> None:
+    """At each question: what was answered before it is answered once more, and the profile is the same."""
+
+    def made(name: str, answers: list[str]) -> tuple[str, dict[str, bytes]]:
+        folder = there.with_name(name) / "ex"
+        folder.parent.mkdir()
+        done = asked(folder, answers)
+        assert done.exit_code == 0, done.output
+        return done.stderr, {file.name: file.read_bytes() for file in folder.iterdir()}
+
+    _, plain = made("plain", AS_PRINTED)
+    said, same = made("first", ["back", *AS_PRINTED])
+    assert ("this is the first question" in said, same) == (True, plain)
+    begun = 0
+    for place, before in enumerate(AS_PRINTED[:-1]):
+        if before == "-":
+            begun = place + 1
+        elif begun and before != ".":
+            continue  # a line of what is pasted
+        elif not begun:
+            begun = place
+        answers = [*AS_PRINTED[: place + 1], "back", *AS_PRINTED[begun:]]
+        if before != "-":
+            assert made(f"ex{place}", answers)[1] == plain, before
+            begun = 0
+
+
+@pytest.mark.parametrize(
+    ("question", "wrong", "said"),
+    [
+        ("active_fault", "output_current", "output_current is in A, by its table: it cannot be this"),
+        ("status_word", "output_frequency", "output_frequency is in Hz, by its table"),
+        ("bit 2", "bit 16", "a word has the bits 0 to 15"),
+        ("6, 16", "6, 5", 'is neither 6, 16 nor "6, 16"'),
+    ],
+)
+def test_what_the_table_says_otherwise_is_no_answer(there: Path, question: str, wrong: str, said: str) -> None:
+    place = AS_PRINTED.index(question)
+    done = asked(there, [*AS_PRINTED[:place], wrong, *AS_PRINTED[place:]])
+    assert done.exit_code == 0, done.output
+    assert said in " ".join(done.stderr.split())
+
+
+def test_a_value_that_the_table_has_not_is_asked_for_once_more(there: Path) -> None:
+    place = AS_PRINTED.index("1-01=2")
+    done = asked(there, [*AS_PRINTED[:place], "1-01=7", "n", *AS_PRINTED[place:]])
+    assert (done.exit_code, "The table has 0 keypad, 1 terminals, 2 bus." in done.stderr) == (0, True), done.output
+    other = there.with_name("other")
+    assert asked(other, [*AS_PRINTED[:place], "1-01=7", "y", *AS_PRINTED[place + 1 :]]).exit_code == 0
+    assert [(each.code, each.value) for each in drivebus.Profile.load(other).control()] == [("1-01", 7), ("1-02", 3)]

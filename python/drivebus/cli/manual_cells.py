@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import NamedTuple
 
 from drivebus.cli.wrong_use import WrongUse
 
@@ -15,6 +16,7 @@ __all__ = [
     "TableRow",
     "UnclearAddresses",
     "count_of",
+    "default_of",
     "is_code",
     "place_of",
     "place_of_code",
@@ -35,6 +37,10 @@ _RANGE = re.compile(
     rf"(?: ?[(\[](?:step:? ?)?(?P<step>\d+(?:\.\d+)?) ?(?P<of>{_UNIT})?[)\]])?"
 )
 """`0.1-600.0 s (0.1 s)`: ends, unit and step."""
+_UP_TO = re.compile(
+    rf"(?P<low>{_NUMBER}) ?(?:-|\u2013|~|to|\u2026|\.\.\.?) ?(?P<code>[A-Za-z]{{0,3}}\d{{0,3}}[.-]\d{{1,3}})"
+)
+"""`0 ... P00.03`: up to what a parameter says."""
 _HEX = r"0x[0-9a-f]+|[0-9a-f]{1,4}h|(?=.*[a-f])[0-9a-f]{1,4}"
 """What is in hexadecimal beyond doubt."""
 SCALES = (1, 10, 100, 1000, 10000)
@@ -43,6 +49,17 @@ _CODE = re.compile(r"[A-Z]{0,3}\.?\d{1,3}[.-]\d{1,3}|[A-Z]{1,3}-\d{1,4}|[A-Z]{1,
 """P05.06, F0-01, 02-00, C-02, C014, Pr.117, tFr: how makers call parameters. A number alone may be that of the row."""
 _MARK = re.compile(r"(?<![\w.+-])(\d{1,3}) ?[:=\uff1a] ?")
 """The number before what it means: `0: keypad`, `2=bus`."""
+_BARE_MARK = re.compile(r"(?<![\w.+-])(\d{1,3}) (?=[A-Za-z])")
+"""The same with nothing between them: `0 keypad 1 terminals`. Numbers that count up are that, units are not."""
+
+
+class Printed(NamedTuple):
+    """A range whose step is not known, as the table has it, and the factory value."""
+
+    low: str
+    high: str
+    unit: str
+    default: str
 
 
 @dataclass
@@ -58,6 +75,9 @@ class TableRow:
         unit: Empty for a plain number.
         scale: Counts in one unit; None where the table does not tell.
         low, high: The range as it is printed, or empty.
+        high_from: The parameter that is the highest value, or empty.
+        signed: Whether the table says that there are values below zero.
+        printed: A range whose step is not known.
         access: As `registers.csv` has it.
         code: That of a parameter; empty for a register.
         default: As it is printed, or empty.
@@ -83,11 +103,30 @@ class TableRow:
     notes: list[str] = field(default_factory=list)
     source: str = ""
     variant: str = ""
+    high_from: str = ""
+    signed: bool = False
+    printed: Printed | None = None
 
     def without_range(self) -> None:
         """Leaves the range to the note: it does not fit the step."""
-        self.notes.append(f"the table has the range {self.low} to {self.high}")
-        self.low = self.high = ""
+        self.notes.append(f"the table has the range {self.low} to {self.high or self.high_from}")
+        self.low = self.high = self.high_from = ""
+
+    def by_decimals(self) -> None:
+        """Takes the last decimal of the range that is printed for one count."""
+        if self.printed is None:
+            return
+        decimals = max(len(end.partition(".")[2]) for end in (self.printed.low, self.printed.high))
+        if 10**decimals in SCALES:
+            self.scale, self.unit = 10**decimals, self.unit or self.printed.unit
+            self.take_printed()
+
+    def take_printed(self) -> None:
+        """Takes the range that is printed, now that the step is known."""
+        if self.printed is not None:
+            self.low, self.high, _, self.default = self.printed
+            self.printed = None
+            self.notes = [note for note in self.notes if not note.startswith("the table has the range ")]
 
 
 class UnclearAddresses(WrongUse):
@@ -138,6 +177,16 @@ def take_step(row: TableRow, cells: dict[str, str]) -> None:
             continue
         found = _STEP.fullmatch(said)
         if found is None:
+            # `0.1 %, signed`, `0.1 Hz, 0 ... P00.03`
+            first, _, rest = said.partition(",")
+            found = _STEP.fullmatch(first.strip()) if first.strip() else None
+            if found is not None and rest.strip() == "signed":
+                row.signed = True
+            elif found is not None and not cells.get("range") and _ends(rest.strip()):
+                cells["range"] = rest.strip()
+            elif found is not None:
+                row.notes.append(f"the table says {rest.strip()!r}")
+        if found is None:
             row.notes.append(f"the table says {said!r}" if what == "says" else f"the table has {said!r} as its {what}")
             continue
         row.unit = row.unit or _unit(found["unit"])
@@ -169,11 +218,26 @@ def take_range(row: TableRow, cells: dict[str, str]) -> None:
     """The lowest and the highest value, where the step is known: else the range goes into the note."""
     low, high = _plain(cells.get("low", "")), _plain(cells.get("high", ""))
     said = _plain(cells.get("range", "")) or f"{low}-{high}".strip("-")
-    found = _RANGE.fullmatch(said)
+    found, up_to = _RANGE.fullmatch(said), _UP_TO.fullmatch(said)
     if found is not None and row.scale is not None:
         row.low, row.high = found["low"], found["high"]
+    elif up_to is not None and row.scale is not None:
+        row.low, row.high_from = up_to["low"], up_to["code"]
     elif said:
         row.notes.append(f"the table has the range {said}")
+        if found is not None:
+            row.printed = Printed(found["low"], found["high"], _unit(found["unit"]), default_of(cells))
+
+
+def default_of(cells: dict[str, str]) -> str:
+    """The factory value, where the cell begins with a number."""
+    found = re.match(r"[-+]?\d+(\.\d+)?(?![\w.])", cells.get("default", ""))
+    return "" if found is None else found[0]
+
+
+def _ends(said: str) -> bool:
+    """Whether *said* is a range."""
+    return _RANGE.fullmatch(_plain(said)) is not None or _UP_TO.fullmatch(said) is not None
 
 
 def _plain(cell: str) -> str:
@@ -201,6 +265,8 @@ def take_choices(row: TableRow, cells: dict[str, str]) -> bool:
         said = cells.get(what, "")
         marks = list(_MARK.finditer(said))
         if len(marks) < 2:
+            marks = _counting_up(said)
+        if len(marks) < 2:
             continue
         numbers = [int(mark[1]) for mark in marks]
         ends = [*(mark.start() for mark in marks[1:]), len(said)]
@@ -210,3 +276,16 @@ def take_choices(row: TableRow, cells: dict[str, str]) -> bool:
         row.choices = {number: re.sub("[;=]", ",", label) for number, label in zip(numbers, labels, strict=True)}
         return True
     return False
+
+
+def _counting_up(said: str) -> list[re.Match[str]]:
+    """Where `0 keypad 1 terminals 2 bus` has its numbers; nowhere, where they may be values with their units."""
+    marks: list[re.Match[str]] = []
+    for mark in _BARE_MARK.finditer(said):
+        if not marks or int(mark[1]) > int(marks[-1][1]):
+            marks.append(mark)
+    if not marks or marks[0].start() != 0 or int(marks[0][1]) > 1:
+        return []
+    ends = [*(mark.start() for mark in marks[1:]), len(said)]
+    labels = [said[mark.end() : end].strip(" ,;") for mark, end in zip(marks, ends, strict=True)]
+    return [] if any(re.fullmatch(rf"(?:{_UNIT}|to|or|and)\b.*", label) for label in labels) else marks

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from drivebus.cli.manual_cells import (
     TableRow,
     count_of,
+    default_of,
     is_code,
     place_of,
     place_of_code,
@@ -26,34 +27,44 @@ from drivebus.cli.pasted_table import as_sheet
 from drivebus.cli.wrong_use import WrongUse
 from drivebus.record.sheets import read_sheet
 
-__all__ = ["ManualTable"]
+__all__ = ["ManualTable", "NoAddresses"]
 
 _TITLES = {
     "address": r".*\baddr(ess|\.)?\b.*|register|reg\.?|location",
     "code": r"(function |parameter |param\.? |par\.? )?(code|no\.?|number|id)|par\.?|pr\.?",
     "label": r"(function |parameter |register )?(name|description|definition)|function|meaning|item|designation"
     r"|contents?|parameter|explanation|data",
-    "unit": r"units?",
+    "unit": r"units?( ?[/,] ?\w+)?",
+    "signed": r"sign(ed)?",
     "step": r"resolution|step|increment|precision|accuracy|min(\.|imum)? unit",
     "scale": r"scale|scaling",
     "range": r".*\brange\b.*|limits",
     "choices": r"options?|choices|values?|settings?|set(ting)? values?",
-    "default": r"(factory |initial )?(default|setting|value)( value)?|factory( default)?( setting)?",
+    "default": r"(factory |initial )?(default|setting|value)( value)?|factory( default)?( setting)?|ex[ -]?works",
     "low": r"min(\.|imum)?|low",
     "high": r"max(\.|imum)?|high",
-    "access": r"r/?w|read/write|access|attributes?|property",
+    "access": r"r/?w|read/write|access|acc\.?|attributes?|property|change(s|d|able)?( .*)?|modif(y|ication)( .*)?",
 }
 _ACCESS = {
     "ro": r"r|ro|read( ?only)?|r only",
     "wo": r"w|wo|write( ?only)?|w only",
     "rw": r"rw|r/w|wr|w/r|read ?/ ?write|read and write",
 }
-_ACCESS_OF_PARAMETERS = _ACCESS | {"rw": r"(?!)"}
+_ACCESS_OF_PARAMETERS = {
+    "ro": _ACCESS["ro"],
+    "wo": _ACCESS["wo"],
+    "run": r"run|any ?time|always|(while |when |during |in )(running|operation|run)|run(ning)? ?(and|or|/) ?stop(ped)?",
+    "stop": r"stop(ped)?|(only )?(while |when |at |during |in )(stop(ped)?|standstill|rest)",
+}
 """Of a parameter, that it can be written does not tell whether also while the motor turns."""
 _REGISTERS = "address,table,name,label,unit,scale,signed,low,high,high_from,variant,access,verified,note,source"
 _PARAMETERS = (
     "code,address,name,label,unit,scale,signed,low,low_from,high,high_from,default,access,choices,verified,note,source"
 )
+
+
+class NoAddresses(WrongUse):
+    """A table has codes of parameters, and no addresses."""
 
 
 class ManualTable:
@@ -62,11 +73,13 @@ class ManualTable:
     Attributes:
         rows: What could be read.
         left_out: The line of each row of the last table that could not, and why.
+        unused: The titles of the columns of the last table of which nothing was taken.
     """
 
     def __init__(self) -> None:
         self.rows: list[TableRow] = []
         self.left_out: list[tuple[int, str]] = []
+        self.unused: list[str] = []
         self._names: dict[str, int] = {}
 
     def read(self, data: bytes, source: str, *, count: str | None = None) -> list[TableRow]:
@@ -77,12 +90,14 @@ class ManualTable:
 
         Raises:
             WrongUse: It has no column of addresses or of names, or its addresses may mean two things. No row was
-                added.
+                added. `NoAddresses`: only the codes of parameters.
             NotAllowed: It is no such text.
         """
         data = as_sheet(data)
         titles, rows = read_sheet(data, titles_of(data))
         places = _columns(titles, by_code=count == "group.index")
+        used = set(places.values())
+        self.unused = [title for place, title in enumerate(titles) if title and place not in used]
         cells = [(line, _cells(row, places)) for line, row in rows]
         count = count or count_of(titles[places["address"]], [row["address"] for _, row in cells])
         by_code = count == "group.index"
@@ -118,14 +133,14 @@ class ManualTable:
         else:
             take_step(row, cells)
             take_range(row, cells)
+        row.signed = row.signed or cells.get("signed", "").lower() in {"yes", "y", "signed", "1", "x"}
         known = _ACCESS_OF_PARAMETERS if row.code else _ACCESS
         said = cells.get("access", "").lower()
         row.access = next((access for access, words in known.items() if re.fullmatch(words, said)), "unknown")
         if table == "input":
             row.access = "ro"
         if row.code and row.scale is not None:
-            found = re.match(r"[-+]?\d+(\.\d+)?(?![\w.])", cells.get("default", ""))
-            row.default = "" if found is None else found[0]
+            row.default = default_of(cells)
         return row
 
     def _name(self, label: str) -> str:
@@ -159,7 +174,7 @@ class ManualTable:
             said = ", ".join(f"{number}: {label}" for number, label in row.choices.items())
             row.notes.append(f"the table has {said}")
             row.choices = {}
-        elif row.low or row.high:
+        elif row.low or row.high or row.high_from:
             row.without_range()
         else:
             self.rows.remove(row)
@@ -169,16 +184,18 @@ class ManualTable:
         """The rows as `registers.csv` and `parameters.csv` have them."""
         registers, parameters = [_REGISTERS.split(",")], [_PARAMETERS.split(",")]
         for row in self.rows:
-            signed = "yes" if row.low.startswith("-") else "no"
+            signed = "yes" if row.signed or row.low.startswith("-") else "no"
             scale = "" if row.scale is None else str(row.scale)
             at = f"0x{row.address:04X}"
             facts = [row.name, row.label, row.unit, scale, signed, row.low]
             proof = ["yes", "; ".join(row.notes), row.source]
             if row.code:
                 choices = ";".join(f"{number}={label}" for number, label in row.choices.items())
-                parameters.append([row.code, at, *facts, "", row.high, "", row.default, row.access, choices, *proof])
+                parameters.append(
+                    [row.code, at, *facts, "", row.high, row.high_from, row.default, row.access, choices, *proof]
+                )
             else:
-                registers.append([at, row.table, *facts, row.high, "", row.variant, row.access, *proof])
+                registers.append([at, row.table, *facts, row.high, row.high_from, row.variant, row.access, *proof])
         return {"registers.csv": _as_text(registers), "parameters.csv": _as_text(parameters)}
 
 
@@ -214,8 +231,11 @@ def _columns(titles: Sequence[str], *, by_code: bool) -> dict[str, int]:
     for what, wanted in (needed, ("label", "a name")):
         if what in places:
             continue
+        joined = next((title for title in titles if _is_joined(title)), None)
+        if joined is not None:
+            raise WrongUse(f'"{joined}" may be two columns: divide titles by two blanks, as their cells are')
         if what == "address" and "code" in places:
-            raise WrongUse(
+            raise NoAddresses(
                 "no column of the table is an address. Where the manual says that the code of a parameter tells it, "
                 "P05.06 is at 0506H, give --addresses group.index"
             )
@@ -225,3 +245,12 @@ def _columns(titles: Sequence[str], *, by_code: bool) -> dict[str, int]:
             "needed"
         )
     return places
+
+
+def _is_joined(title: str) -> bool:
+    """Whether *title* is no title, and each word of it is one."""
+
+    def is_one(text: str) -> bool:
+        return any(re.fullmatch(words, text) for words in _TITLES.values())
+
+    return not is_one(title.lower()) and all(map(is_one, title.lower().split()))

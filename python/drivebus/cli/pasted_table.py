@@ -23,7 +23,7 @@ def as_sheet(data: bytes) -> bytes:
     if "|" in titles:
         cells = [_between_bars(line) for line in lines]
     elif not re.search(r"[,;\t]", titles) and re.search(r" {2,}", titles):
-        cells = [re.split(r" {2,}", line.strip()) for line in lines]
+        cells = _between_gaps(lines)
     else:
         return data
     out = io.StringIO()
@@ -33,3 +33,36 @@ def as_sheet(data: bytes) -> bytes:
 
 def _between_bars(line: str) -> list[str]:
     return [cell.strip() for cell in line.strip().removeprefix("|").removesuffix("|").split("|")]
+
+
+def _between_gaps(lines: list[str]) -> list[list[str]]:
+    """The cells of each line. A line that begins further in than the titles goes on with the cells above it."""
+    cells: list[list[str]] = []
+    titles = next(line for line in lines if line.strip())
+    starts = [gap.end() for gap in re.finditer(r"^ *| {2,}(?=\S)", titles)]
+    row: list[str] | None = None
+    for line in lines:
+        found = [(piece.start(), piece[0]) for piece in re.finditer(r"\S+(?: \S+)*", line)]
+        if row is None or not found or found[0][0] <= starts[0] + 1:
+            cells.append(_divided(found, starts))
+            # What stands below the titles is no part of them.
+            row = cells[-1] if len(cells) > 1 and found and line is not titles else row
+            continue
+        cells.append([])
+        for start, text in found:
+            column = max(place for place, begin in enumerate(starts) if begin <= start + 1 or place == 0)
+            row.extend([""] * (column + 1 - len(row)))
+            row[column] = f"{row[column]} {text}".strip()
+    return cells
+
+
+def _divided(found: list[tuple[int, str]], starts: list[int]) -> list[str]:
+    """The texts of a line; one that leaves a cell too few is divided where a word stands below a title."""
+    cells: list[str] = []
+    lacking = len(starts) - len(found)
+    for start, text in found:
+        cuts = [begin - start for begin in starts if 0 < begin - start < len(text) and text[begin - start - 1] == " "]
+        cuts = cuts[:lacking] if lacking > 0 else []
+        lacking -= len(cuts)
+        cells += [text[one:other].strip() for one, other in zip([0, *cuts], [*cuts, len(text)], strict=True)]
+    return cells

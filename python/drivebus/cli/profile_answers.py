@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -9,7 +11,7 @@ from dataclasses import dataclass, field
 from drivebus.cli.manual_cells import TableRow
 from drivebus.cli.manual_table import ManualTable
 
-__all__ = ["Answers", "Bits", "Commands", "Setting", "Share", "State"]
+__all__ = ["Answers", "Bits", "Commands", "Ramp", "Setting", "Share", "State", "Watchdog"]
 
 Bits = Mapping[tuple[int, int], int]
 """Of a word, the highest and the lowest bit of a field, and what stands there."""
@@ -63,6 +65,25 @@ class Setting:
 
     code: str
     value: int
+    label: str
+    source: str
+
+
+@dataclass
+class Ramp:
+    """A stop takes what *time* says, from the frequency in *start* to 0."""
+
+    time: str
+    start: str
+
+
+@dataclass
+class Watchdog:
+    """What the drive does where the bus is silent for *timeout*: *action* says it, if there is such a parameter."""
+
+    timeout: str
+    action: str
+    words: dict[str, int]
     source: str
 
 
@@ -75,15 +96,17 @@ class Answers:
         manual: Document and edition.
         table: The rows of its tables.
         serial: Speed, format and unit as the drive leaves the factory, and where that is printed.
-        writes: The function that writes one word: 6 or 16.
+        writes: The functions that write words: 6, 16, or both.
         max_words: The most words in one request.
+        is_read_back: Whether the table says that the setpoint can be read.
+        faults: Number, code on the keypad and meaning of each.
     """
 
     title: str
     manual: str
     table: ManualTable
     serial: tuple[int, str, int, str] | None = None
-    writes: int = 6
+    writes: list[int] = field(default_factory=lambda: [6])
     max_words: int = 1
     requests_source: str = ""
     commands: Commands | None = None
@@ -92,11 +115,23 @@ class Answers:
     share: Share | None = None
     frequency: TableRow | None = None
     fault: TableRow | None = None
+    is_read_back: bool = False
     control: list[Setting] = field(default_factory=list)
+    ramp: Ramp | None = None
+    watchdog: Watchdog | None = None
+    faults: list[tuple[int, str, str]] = field(default_factory=list)
+    faults_source: str = ""
 
     def rules(self, folder: str, name: str) -> str:
         """The text of `profile.toml`."""
         return "\n".join(self._rules(folder, name))
+
+    def fault_rows(self) -> str:
+        """The rows of `faults.csv`."""
+        text = io.StringIO()
+        rows = ((code, mnemonic, label, "", "", "yes", "", self.faults_source) for code, mnemonic, label in self.faults)
+        csv.writer(text, lineterminator="\n").writerows(rows)
+        return text.getvalue()
 
     def _rules(self, folder: str, name: str) -> Iterator[str]:
         yield "#:schema ./profile.schema.json"
@@ -115,23 +150,29 @@ class Answers:
         if self.state is not None:
             yield from self._state(self.state)
         roles = {"fault": self.fault, "frequency": self.frequency}
+        if self.is_read_back:
+            roles["setpoint"] = self.setpoint
         yield from _table("status", **{role: row.name for role, row in roles.items() if row is not None})
+        if self.ramp is not None:
+            yield from _table("ramp", deceleration=self.ramp.time, start=self.ramp.start)
         for setting in self.control:
-            yield from _table(
-                "[control]", code=setting.code, value=setting.value, label="it obeys the bus", verified=True
-            )
+            yield from _table("[control]", code=setting.code, value=setting.value, label=setting.label, verified=True)
             yield from _keys(source=setting.source)
         if self.setpoint is not None:
             yield from _table("setpoints.frequency", register=self.setpoint.name)
         if self.share is not None:
             yield from self._share(self.share)
+        if self.watchdog is not None:
+            action = {"action": self.watchdog.action} if self.watchdog.action else {}
+            yield from _table("watchdog", timeout=self.watchdog.timeout, **action, **self.watchdog.words)
+            yield from _keys(verified=True, source=self.watchdog.source)
         yield from _table("monitor", registers=self._shown())
         if self.state is not None and self.state.bits:
             yield from self._bits(self.state)
 
     def _requests(self) -> Iterator[str]:
         tables = {row.table for row in self.table.rows}
-        functions = [3, *[4] * ("input" in tables), self.writes]
+        functions = [3, *[4] * ("input" in tables), *self.writes]
         source = self.requests_source or "not printed: what nearly every drive can"
         yield from _table("requests", functions=functions, max_words=self.max_words, source=source)
 

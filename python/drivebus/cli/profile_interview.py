@@ -6,19 +6,17 @@ Nothing is guessed: what the manual does not print is left out by Enter, and wha
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import TypeVar
 
-import click
-
 import drivebus
-from drivebus.cli.manual_cells import COUNTS, SCALES, TableRow, UnclearAddresses, place_of
-from drivebus.cli.manual_table import ManualTable
-from drivebus.cli.present.output import remark
-from drivebus.cli.profile_answers import Answers, Bits, Commands, Setting, Share, State
+from drivebus.cli import answer_values as values
+from drivebus.cli.dialogue import Dialogue
+from drivebus.cli.manual_cells import COUNTS, TableRow, UnclearAddresses
+from drivebus.cli.manual_table import ManualTable, NoAddresses
+from drivebus.cli.profile_answers import Answers, Commands, Ramp, Setting, Share, State, Watchdog
 from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["ask"]
@@ -39,6 +37,7 @@ _STATES = {
     "stopped": "while it stands still",
     "fault": "while it has a fault",
 }
+_SPEED_UNITS = {"Hz", "%", "rpm"}
 _BY_BITS = ("fault", "forward", "reverse", "running", "stopped")
 """Of those that fit, the first counts, where none is a running motor."""
 _ADDRESS = r"0x[0-9a-f]{1,4}|[0-9a-f]{1,4}h|[34]\d{4,5}"
@@ -51,22 +50,31 @@ def ask(table: Path | None, source: str | None, count: str | None) -> Answers:
         click.Abort: The input ended, or Ctrl-C was pressed.
         WrongUse: *table* cannot be read.
     """
-    remark("The manual's chapter on Modbus answers what follows. Enter leaves out what it does not print.")
-    title = _needed("Maker and series, as the drive's plate has them", _text)
-    manual = _needed("The manual: title or number, edition", _text)
-    interview = _Interview(manual)
-    if table is not None and source is not None:
-        interview.take(table.read_bytes(), source, count)
-    interview.take_tables(count)
-    answers = Answers(title, manual, interview.table)
-    interview.fill(answers)
-    return answers
+    dialogue = Dialogue()
+
+    def asked() -> Answers:
+        dialogue.say(
+            "The manual's chapter on Modbus answers what follows. Enter leaves out what it does not print; "
+            "back takes the last answer back."
+        )
+        title = dialogue.needed("Maker and series, as the drive's plate has them", values.plain)
+        manual = dialogue.needed("The manual: title or number, edition", values.plain)
+        interview = _Interview(dialogue, manual)
+        if table is not None and source is not None:
+            interview.take(table.read_bytes(), source, count)
+        interview.take_tables(count)
+        answers = Answers(title, manual, interview.table)
+        interview.fill(answers)
+        return answers
+
+    return dialogue.held(asked)
 
 
 class _Interview:
     """The questions that go on from what was answered before: pages, and the rows of tables."""
 
-    def __init__(self, manual: str) -> None:
+    def __init__(self, dialogue: Dialogue, manual: str) -> None:
+        self._dialogue = dialogue
         self.table = ManualTable()
         self._manual = manual
         self._page = ""
@@ -74,63 +82,103 @@ class _Interview:
 
     def take_tables(self, count: str | None) -> None:
         """Tables of the manual, until there are no more."""
-        remark("Tables of registers or parameters spare you typing: CSV, or text as pasted, its line of titles first.")
-        while (found := _optional("File with a table (- to paste one; Enter: no more)", _content)) is not None:
+        self._dialogue.say(
+            "Tables of registers or parameters spare you typing: CSV, or text as pasted, its line of titles first."
+        )
+        question = "File with a table (- to paste one; Enter: no more)"
+        while (found := self._dialogue.optional(question, self._content)) is not None:
             try:
-                self.take(found, self._source(), count)
+                self.take(found.encode(), self._source(), count)
             except (drivebus.NotAllowed, WrongUse) as error:
-                remark(f"Error: {error}")
+                self._dialogue.say(f"Error: {error}")
 
     def take(self, data: bytes, source: str, count: str | None) -> None:
         """Adds a table, and says what was left out of it."""
-        try:
-            rows = self.table.read(data, source, count=count)
-        except UnclearAddresses:
-            count = click.prompt("Its addresses are", type=click.Choice(COUNTS[:3]), err=True)
-            rows = self.table.read(data, source, count=count)
+        rows = self._read(data, source, count)
         for line, why in sorted(self.table.left_out):
-            remark(f"line {line} is left out: {why}")
+            self._dialogue.say(f"line {line} is left out: {why}")
+        if self.table.unused:
+            self._dialogue.say(f"Nothing is taken from the columns {', '.join(map(repr, self.table.unused))}.")
+        self._take_decimals(rows)
         for row in rows:
             if row.notes:
-                remark(f"line {row.line}, {row.code or row.name}: {'; '.join(row.notes)}")
+                self._dialogue.say(f"line {row.line}, {row.code or row.name}, goes into a note: {'; '.join(row.notes)}")
         for kind, found in (("Registers", [row for row in rows if not row.code]), ("Parameters", [*_coded(rows)])):
             if found:
-                remark(f"{kind}: {', '.join(f'{row.code or row.name} at {row.address:04X}H' for row in found)}.")
+                self._dialogue.say(
+                    f"{kind}: {', '.join(f'{row.code or row.name} at {row.address:04X}H' for row in found)}."
+                )
+
+    def _read(self, data: bytes, source: str, count: str | None) -> list[TableRow]:
+        """The rows of a table, whose addresses may have to be asked for."""
+        try:
+            return self.table.read(data, source, count=count)
+        except UnclearAddresses:
+            count = self._dialogue.needed("Its addresses are hex, decimal or 40001", _of(COUNTS[:3]))
+        except NoAddresses:
+            if not self._dialogue.agreed(
+                "Does the code of a parameter tell its address, P05.06 at 0506H?", default=False
+            ):
+                raise
+            count = "group.index"
+        return self.table.read(data, source, count=count)
+
+    def _take_decimals(self, rows: list[TableRow]) -> None:
+        """The steps of ranges that are printed without one, if their decimals tell."""
+        printed = [row for row in rows if row.printed is not None]
+        if not printed:
+            return
+        low, high, unit, _ = printed[0].printed or ("", "", "", "")
+        first = f"{printed[0].code or printed[0].name}: {low} to {high} {unit}".rstrip()
+        if self._dialogue.agreed(f"Is one count the last decimal that a range has ({first})?", default=False):
+            for row in printed:
+                row.by_decimals()
+
+    def _content(self, text: str) -> str:
+        """What is in a file, or is pasted."""
+        if text == "-":
+            return self._dialogue.pasted()
+        try:
+            return Path(text).read_bytes().decode("utf-8-sig", "replace")
+        except OSError as error:
+            raise WrongUse(f"{text}: {error.strerror or error}") from error
 
     def fill(self, answers: Answers) -> None:
         """Asks for all that makes the drive known by name."""
         answers.commands = self._commands()
-        answers.setpoint = self._register("Register that takes the speed", "Speed setpoint", access="rw")
+        answers.setpoint = self._register("Register that takes the speed", "Speed setpoint", "rw", _SPEED_UNITS)
         if answers.setpoint is not None:
+            answers.is_read_back = bool(answers.setpoint.line) and answers.setpoint.access == "rw"
             answers.share = self._take_speed(answers.setpoint)
             if answers.setpoint.scale is None and answers.share is None:
-                remark("Then its speed cannot be set by name.")
+                self._dialogue.say("Then its speed cannot be set by name.")
                 answers.setpoint = None
         answers.state = self._state()
-        answers.frequency = self._register("Register that tells the output frequency", "Output frequency", access="ro")
+        answers.frequency = self._register("Register that tells the output frequency", "Output frequency", "ro", {"Hz"})
         if answers.frequency is not None and not self._is_in_hertz(answers.frequency):
             answers.frequency = None
-        answers.fault = self._register("Register that tells the number of a fault", "Fault", access="ro")
+        answers.fault = self._register("Register that tells the number of a fault", "Fault", "ro", set())
         if answers.fault is not None and answers.fault.scale is None:
             answers.fault.scale = 1
         answers.control.extend(self._control())
-        if any(row.access == "unknown" for row in self.table.parameters):
-            only_at_rest = click.confirm("Are parameters written only while the motor stands?", default=True, err=True)
-            for row in self.table.parameters:
-                row.access = "stop" if only_at_rest and row.access == "unknown" else row.access
-        answers.writes = int(
-            click.prompt("Function that writes a word", default="6", type=click.Choice(["6", "16"]), err=True)
-        )
-        answers.max_words = click.prompt(
-            "Most words in one request; 1 is never wrong", default=1, type=click.IntRange(1, 125), err=True
-        )
-        answers.requests_source = self._source() if answers.max_words > 1 or answers.writes != 6 else ""
-        line = _optional("The line as it leaves the factory: speed, format, unit, such as 9600 8N1 1", _line)
+        answers.ramp = self._ramp()
+        answers.watchdog = self._watchdog()
+        self._take_access()
+        if answers.fault is not None:
+            question = "File with the numbers of the faults, 1 OC overcurrent (- to paste; Enter: none)"
+            answers.faults = self._dialogue.optional(question, lambda text: values.faults(self._content(text))) or []
+            answers.faults_source = self._source() if answers.faults else ""
+        answers.writes = self._dialogue.needed("Functions that write words: 6, 16, or both", values.functions, "6")
+        most = "Most words in one request; 1 is never wrong"
+        answers.max_words = self._dialogue.needed(most, _most_words, "1")
+        answers.requests_source = self._source() if answers.max_words > 1 or answers.writes != [6] else ""
+        factory = "The line as it leaves the factory: speed, format, unit, such as 9600 8N1 1"
+        line = self._dialogue.optional(factory, values.line)
         if line is not None:
             answers.serial = (*line, self._source())
 
     def _commands(self) -> Commands | None:
-        register = self._register("Register that takes run and stop", "Command to the motor", access="wo")
+        register = self._register("Register that takes run and stop", "Command to the motor", "wo", set())
         if register is None:
             return None
         _allow(register, "wo")
@@ -138,37 +186,36 @@ class _Interview:
         words: dict[str, int] = {}
         elsewhere: dict[str, tuple[TableRow, int]] = {}
         for command, question in _COMMANDS.items():
-            word = _optional(question, _new(words, _word))
+            word = self._dialogue.optional(question, values.new(words, values.command_word))
             if word is not None:
                 words[command] = word
-        if (reset := _optional(_RESET, lambda text: self._reset(text, register, words))) is not None:
+        reset = self._dialogue.optional(_RESET, lambda text: self._reset(text, register, words))
+        if reset is not None:
             row, word = reset
             if row is register:
                 words["reset_fault"] = word
             else:
                 elsewhere["reset_fault"] = reset
         if not words:
-            remark("Then it is not told anything by name.")
+            self._dialogue.say("Then it is not told anything by name.")
             return None
         if "run_forward" in words and not {"stop", "coast"} & set(words):
-            remark("Without a stop and a coast it is not started by name.")
+            self._dialogue.say("Without a stop and a coast it is not started by name.")
         _widen(register, [*words.values()])
-        is_printed = click.confirm("Are these words in the manual of this very drive?", default=True, err=True)
+        is_printed = self._dialogue.agreed("Are these words in the manual of this very drive?", default=True)
         return Commands(register, words, elsewhere, is_printed, source)
 
     def _state(self) -> State | None:
-        register = self._register("Register that tells what the motor does", "What the motor does", access="ro")
+        register = self._register("Register that tells what the motor does", "What the motor does", "ro", set())
         if register is None:
             return None
         source = self._source_of(register)
         register.scale = 1
-        how = click.prompt(
-            "It tells by one number for each state, or by bits", type=click.Choice(["number", "bits"]), err=True
-        )
+        how = self._dialogue.needed("It tells by one number for each state, or by bits", _of(("number", "bits")))
         if how == "number":
-            numbers = _each_state(_STATES, "Number", _word)
+            numbers = self._each_state(_STATES, "Number", values.word)
             return State(register, numbers, {}, source) if numbers else None
-        bits = _each_state(_BY_BITS, "Bits, such as 0=1, 4-3=2,", _bits)
+        bits = self._each_state(_BY_BITS, "Bits, such as 0=1, 4-3=2,", values.bits)
         return State(register, {}, bits, source) if bits else None
 
     def _take_speed(self, row: TableRow) -> Share | None:
@@ -176,7 +223,8 @@ class _Interview:
         _allow(row, "rw")
         if row.unit == "Hz" and row.scale is not None:
             return None
-        said = _optional("One count of it is, such as 0.01 Hz; or counts that are a frequency, 10000 = P00.03", _speed)
+        question = "One count of it is, such as 0.01 Hz; or counts that are a frequency, 10000 = P00.03"
+        said = self._dialogue.optional(question, values.speed)
         row.scale = None
         if said is None:
             return None
@@ -184,11 +232,14 @@ class _Interview:
             row.unit, row.scale = "Hz", int(1 / said)
             return None
         counts, of = said
-        code = self._parameter(of) if of else _needed("100 % is the parameter, such as P00.03", self._parameter)
+        whole = "100 % is the parameter, such as P00.03"
+        code = self._parameter(of) if of else self._dialogue.needed(whole, self._parameter)
         if code.scale is None or code.unit != "Hz":
-            code.unit, code.scale = "Hz", int(1 / _needed("One count of it is, such as 0.01 Hz", _hertz))
+            code.unit = "Hz"
+            code.scale = int(1 / self._dialogue.needed("One count of it is, such as 0.01 Hz", values.hertz))
         if not (code.low and code.high):
-            low, high = _needed(f"{code.code} may be from and to, in Hz, such as 10 400", _two_numbers)
+            ends = f"{code.code} may be from and to, in Hz, such as 10 400"
+            low, high = self._dialogue.needed(ends, values.two_numbers)
             code.low, code.high = f"{low:g}", f"{high:g}"
         low, high = float(code.low), float(code.high)
         if row.low or row.high:
@@ -198,46 +249,133 @@ class _Interview:
 
     def _is_in_hertz(self, row: TableRow) -> bool:
         if row.unit != "Hz" or row.scale is None:
-            step = _optional("One count of it is, such as 0.01 Hz", _hertz)
+            step = self._dialogue.optional("One count of it is, such as 0.01 Hz", values.hertz)
             row.unit, row.scale = ("Hz", int(1 / step)) if step is not None else (row.unit, row.scale)
         return row.unit == "Hz" and row.scale is not None
 
     def _control(self) -> Iterator[Setting]:
         question = "Parameter that must be set so that the bus gives commands, or the speed: P00.01=2 (Enter: no more)"
-        while (found := _optional(question, self._setting)) is not None:
+        while (found := self._dialogue.optional(question, self._setting)) is not None:
             row, value = found
             if row.scale is None:
                 row.scale = 1
-            yield Setting(row.code, value, self._source_of(row))
+            if not (row.choices or row.low or row.high):
+                ends = f"{row.code} may be from and to, such as 0 3 (Enter: not printed; then it is set by hand)"
+                between = self._dialogue.optional(ends, values.two_numbers)
+                if between is not None:
+                    row.low, row.high = (f"{end:g}" for end in between)
+                    row.notes.clear()
+            yield Setting(row.code, value, row.label, row.source)
 
     def _setting(self, text: str) -> tuple[TableRow, int]:
         code, equals, value = text.partition("=")
         if not equals:
             raise WrongUse(f'"{text}" is no parameter and value, such as P00.01=2')
-        return self._parameter(code.strip()), _word(value.strip())
+        row, word = self._parameter(code.strip()), values.word(value.strip())
+        if row.choices and word not in row.choices:
+            known = ", ".join(f"{number} {label}" for number, label in row.choices.items())
+            if not self._dialogue.agreed(f"The table has {known}. Is {word} printed all the same?", default=False):
+                raise WrongUse(f"{row.code} cannot be {word}")
+            row.choices[word] = "not in the table"
+        return row, word
+
+    def _ramp(self) -> Ramp | None:
+        """What tells how long a stop takes, so that it is known when the motor should stand."""
+        time = self._dialogue.optional("Parameter with the time of the ramp of a stop, in seconds", self._parameter)
+        if time is None:
+            return None
+        start = self._dialogue.optional("Parameter with the frequency which that time begins from", self._parameter)
+        if start is None or not (self._counts(time, "s") and self._counts(start, "Hz")):
+            self._dialogue.say("Then a stop waits for standstill, however long that is.")
+            return None
+        return Ramp(time.code, start.code)
+
+    def _watchdog(self) -> Watchdog | None:
+        """What the drive does of its own where the bus is silent."""
+        timeout = self._dialogue.optional(
+            "Parameter with the time after which it acts on a silent bus", self._parameter
+        )
+        if timeout is None or not self._counts(timeout, "s"):
+            return None
+        action = self._dialogue.optional("Parameter that says what it does then", self._parameter)
+        if action is None:
+            return Watchdog(timeout.code, "", {}, timeout.source)
+        action.scale = 1 if action.scale is None else action.scale
+        read = values.new(known := dict[str, int](), values.word)
+        for what, question in (("stop", "Its value for a stop along the ramp"), ("coast", "Its value for a coast")):
+            word = self._dialogue.optional(question, read)
+            if word is not None:
+                known[what] = word
+        return Watchdog(timeout.code, action.code, known, timeout.source)
+
+    def _counts(self, row: TableRow, unit: str) -> bool:
+        """Whether it is known how many counts of *row* one *unit* has, or it is said now."""
+        if row.unit != unit or row.scale is None:
+            step = self._dialogue.optional(
+                f"One count of {row.code} is, such as 0.1 {unit}", lambda text: values.step(text, unit)
+            )
+            if step is None:
+                return False
+            row.unit, row.scale = unit, int(1 / step)
+            row.take_printed()
+        return True
+
+    def _take_access(self) -> None:
+        """Which parameters may be written while the motor turns, where their table does not tell."""
+        unknown = {row.code.lower(): row for row in self.table.parameters if row.access == "unknown"}
+        if not unknown:
+            return
+        asked = ", ".join(row.code for row in unknown.values())
+        question = f"Which of {asked} may be written while the motor turns: codes, or all (Enter: none)"
+
+        def codes(text: str) -> list[TableRow]:
+            said = [*unknown] if text.lower() == "all" else re.split(r"[, ]+", text.lower())
+            wrong = next((code for code in said if code not in unknown), None)
+            if wrong is not None:
+                raise WrongUse(f'"{wrong}" is none of {asked}')
+            return [unknown[code] for code in said]
+
+        for row in self._dialogue.optional(question, codes) or []:
+            row.access = "run"
+        for row in unknown.values():
+            row.access = "stop" if row.access == "unknown" else row.access
+
+    def _each_state(self, states: Iterable[str], question: str, read: Callable[[str], T]) -> dict[str, T]:
+        """What tells each of *states*. Who has named a direction is not asked for a state without one."""
+        known: dict[str, T] = {}
+        for state in states:
+            if state == "running" and {"forward", "reverse"} & set(known):
+                continue
+            told = self._dialogue.optional(f"{question} {_STATES[state]}", values.new(known, read))
+            if told is not None:
+                known[state] = told
+        return known
 
     def _parameter(self, text: str) -> TableRow:
         """A parameter by its code, or by the name or the address of its row."""
         called = text.lower()
         row = next((row for row in self.table.rows if called in {row.code.lower() or None, row.name}), None)
         if row is None and re.fullmatch(_ADDRESS, called):
-            row = self._at(_place(text)[1])
+            row = self._at(values.place(text)[1])
             if row is None:
                 raise WrongUse(f"no table has {text}; say its code, as the keypad shows it")
         if row is not None:
-            row.code = row.code or _needed(f"The code of {row.name}, as the keypad shows it", _code)
+            called = f"The code of {row.name}, as the keypad shows it"
+            row.code = row.code or self._dialogue.needed(called, values.code)
             return row
-        code = _code(text)
-        found = _optional(f"No table has {code}. Its address on the bus (Enter: another code)", _place)
+        code = values.code(text)
+        question = f"No table has {code}. Its address on the bus (Enter: another code)"
+        found = self._dialogue.optional(question, values.place)
         if found is None or found[0] != "holding":
             raise WrongUse(f"{code} needs the address of a holding register")
         row = self._at(found[1]) or self.table.add(found[1], code, self._source())
         row.code = row.code or code
         return row
 
-    def _register(self, question: str, label: str, *, access: str) -> TableRow | None:
-        """The row that is named by its name or address; one that no table has is made."""
-        found = _optional(f"{question}: name or address, such as 2000H", self._free)
+    def _register(self, question: str, label: str, access: str, units: set[str]) -> TableRow | None:
+        """The row that is named by its name or address; one that no table has is made. It is in none but *units*."""
+        question = f"{question}: name or address, such as 2000H"
+        found = self._dialogue.optional(question, lambda text: self._free(text, units))
         if isinstance(found, int):
             found = self.table.add(found, label, self._source())
         if found is not None:
@@ -246,8 +384,10 @@ class _Interview:
             found.access = access
         return found
 
-    def _free(self, text: str) -> TableRow | int:
+    def _free(self, text: str, units: set[str]) -> TableRow | int:
         found = self._known_or_place(text)
+        if isinstance(found, TableRow) and found.unit and found.unit not in units:
+            raise WrongUse(f"{found.name} is in {found.unit}, by its table: it cannot be this")
         if any(found is row for row in self._used):
             raise WrongUse(f"{text} is the register of another answer")
         return found
@@ -256,7 +396,7 @@ class _Interview:
         row = next((row for row in self.table.rows if text.lower() in {row.name, row.code.lower() or None}), None)
         if row is not None:
             return row
-        table, address = _place(text)
+        table, address = values.place(text)
         row = next((row for row in self.table.rows if (row.table, row.address) == (table, address)), None)
         if row is None and table != "holding":
             raise WrongUse(f'no table has "{text}", which is an input register')
@@ -268,10 +408,10 @@ class _Interview:
     def _reset(self, text: str, register: TableRow, words: Mapping[str, int]) -> tuple[TableRow, int]:
         """A word that means one thing only to *register*, or another register and its word."""
         place, equals, said = (part.strip() for part in text.rpartition("="))
-        address = _place(place)[1] if equals else register.address
+        address = values.place(place)[1] if equals else register.address
         if address == register.address:
-            return register, _new(words, _word)(said)
-        word = _word(said)
+            return register, values.new(words, values.command_word)(said)
+        word = values.command_word(said)
         row = self._at(address) or self.table.add(address, "Fault reset", self._source())
         _allow(row, "wo")
         _widen(row, [word])
@@ -287,155 +427,31 @@ class _Interview:
 
     def _source(self, question: str = "Its page") -> str:
         """Document and page; the page before is offered."""
-        page = click.prompt(question, default=self._page or None, err=True)
-        self._page = " ".join(str(page).split())
+        self._page = self._dialogue.needed(question, values.plain, self._page or None)
         return f"{self._manual}, {f'p. {self._page}' if self._page.isdecimal() else self._page}"
 
 
-def _each_state(states: Iterable[str], question: str, read: Callable[[str], T]) -> dict[str, T]:
-    """What tells each of *states*. Who has named a direction is not asked for a state without one."""
-    known: dict[str, T] = {}
-    for state in states:
-        if state == "running" and {"forward", "reverse"} & set(known):
-            continue
-        told = _optional(f"{question} {_STATES[state]}", _new(known, read))
-        if told is not None:
-            known[state] = told
-    return known
+def _of(choices: Iterable[str]) -> Callable[[str], str]:
+    """What takes one of *choices*."""
+    known = list(choices)
+
+    def read(text: str) -> str:
+        if text.strip() not in known:
+            raise WrongUse(f'"{text.strip()}" is not one of {", ".join(known)}')
+        return text.strip()
+
+    return read
 
 
-def _needed(question: str, read: Callable[[str], T]) -> T:
-    answer: T = click.prompt(question, value_proc=read, err=True)
-    return answer
-
-
-def _optional(question: str, read: Callable[[str], T]) -> T | None:
-    def taken(said: str) -> T | None:
-        return read(said.strip()) if said.strip() else None
-
-    answer: T | None = click.prompt(question, default="", show_default=False, value_proc=taken, err=True)
-    return answer
+def _most_words(text: str) -> int:
+    count = values.word(text.strip())
+    if not 1 <= count <= 125:
+        raise WrongUse(f"{count} is not in the range from 1 to 125")
+    return count
 
 
 def _coded(rows: Iterable[TableRow]) -> Iterator[TableRow]:
     return (row for row in rows if row.code)
-
-
-def _code(text: str) -> str:
-    if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,15}", text) is None:
-        raise WrongUse(f'"{text}" is no code of a parameter, such as P00.03 or F0-10')
-    return text
-
-
-def _text(text: str) -> str:
-    said = " ".join(text.split())
-    if not said:
-        raise WrongUse("this is needed")
-    return said
-
-
-def _content(text: str) -> bytes:
-    """What is in a file, or is pasted until a line with a single dot."""
-    if text != "-":
-        try:
-            return Path(text).read_bytes()
-        except OSError as error:
-            raise WrongUse(f"{text}: {error.strerror or error}") from error
-    remark("Paste it; then a dot on a line of its own.")
-    lines: list[str] = []
-    while (line := sys.stdin.readline()).strip() != "." and line:
-        lines.append(line)
-    return "".join(lines).encode()
-
-
-def _place(text: str) -> tuple[str, int]:
-    """Table and address of a register, where they can be read in one way only."""
-    plain = text.lower().replace(" ", "")
-    is_hex = plain.startswith("0x") or plain.endswith("h") or re.search("[a-f]", plain) is not None
-    found = place_of(text, "hex") if is_hex else place_of(text, "40001")
-    if found is None:
-        both = f": it may be {plain}H, or {int(plain)} as 0x{int(plain):04X}" if re.fullmatch(r"\d{1,4}", plain) else ""
-        raise WrongUse(
-            f'"{text}" is no name of the tables and no address{both}. '
-            "Write 2000H, 0x2000, or 48193 for the 8193rd register"
-        )
-    return found
-
-
-def _word(text: str) -> int:
-    """A word in decimal, or in hexadecimal with its sign."""
-    found = re.fullmatch(r"0x([0-9a-f]{1,4})|([0-9a-f]{1,4})h|(0|[1-9]\d{0,4})", text.lower())
-    if found is None or (found[3] and int(found[3]) > 0xFFFF):
-        raise WrongUse(f'"{text}" is no word from 0 to 65535: write 18, 12H or 0x12')
-    return int(found[3]) if found[3] else int(found[1] or found[2], 16)
-
-
-def _new(known: Mapping[str, T], read: Callable[[str], T]) -> Callable[[str], T]:
-    """What reads a thing that means one thing only."""
-
-    def read_new(text: str) -> T:
-        answer = read(text)
-        other = next((name for name, value in known.items() if value == answer), None)
-        if other is not None:
-            raise WrongUse(f"{text} is {other.replace('_', ' ')} already")
-        return answer
-
-    return read_new
-
-
-def _bits(text: str) -> Bits:
-    """Fields of a word and their values, `0=1, 4-3=2`."""
-    found: dict[tuple[int, int], int] = {}
-    for part in filter(None, re.split(r"[, ]+", text)):
-        said = re.fullmatch(r"(?:bit)?(\d{1,2})(?:-(\d{1,2}))?=(\d{1,16})", part.lower())
-        if said is None:
-            raise WrongUse(f'"{part}" is no bit and what it is, such as 0=1, or 4-3=2 for two of them')
-        ends = sorted((int(said[1]), int(said[2] or said[1])), reverse=True)
-        width = ends[0] - ends[1] + 1
-        # As many digits of 0 and 1 as there are bits are these bits: in decimal they would not fit.
-        is_binary = len(said[3]) == width and set(said[3]) <= {"0", "1"}
-        value = int(said[3], 2 if is_binary else 10)
-        if ends[0] > 15 or value >> width:
-            raise WrongUse(f'"{part}": a word has the bits 0 to 15, and {said[3]} does not fit in that')
-        found[ends[0], ends[1]] = value
-    return found
-
-
-def _hertz(text: str) -> Fraction:
-    """What one count is."""
-    said = re.fullmatch(r"(\d*[.,]?\d+) ?hz", text.lower())
-    step = Fraction(said[1].replace(",", ".")) if said else Fraction(0)
-    if not step or 1 / step not in SCALES:
-        raise WrongUse(f'"{text}" is no 1, 0.1, 0.01 or 0.001 Hz, such as 0.01 Hz')
-    return step
-
-
-def _speed(text: str) -> Fraction | tuple[int, str]:
-    """What one count is; or how many counts are a parameter, by its code, which may follow."""
-    share = re.fullmatch(r"(\d*[.,]?\d+) ?%.*", text)
-    step = Fraction(share[1].replace(",", ".")) if share else Fraction(0)
-    whole = re.fullmatch(r"(\d{2,5}) ?= ?(.+)", text)
-    counts = 100 / step if step else Fraction(whole[1]) if whole else None
-    if counts is None:
-        return _hertz(text)
-    if counts.denominator != 1 or counts > 0xFFFF:
-        raise WrongUse(f'"{text}" is no 1 to 65535 counts: write 10000 = P00.03, or 0.01 %')
-    of = whole[2].strip() if whole else ""
-    return int(counts), "" if "%" in of else of
-
-
-def _two_numbers(text: str) -> tuple[float, float]:
-    found = [float(each) for each in re.findall(r"\d+(?:\.\d+)?", text)]
-    if len(found) != 2 or not 0 <= found[0] < found[1]:
-        raise WrongUse(f'"{text}" is no lowest and highest frequency, such as 10 400')
-    return found[0], found[1]
-
-
-def _line(text: str) -> tuple[int, str, int]:
-    said = re.fullmatch(r"(\d{3,6})[ ,]+(8[neo][12])[ ,]+(\d{1,3})", text.lower())
-    if said is None or not 1 <= int(said[3]) <= 247:
-        raise WrongUse(f'"{text}" is no speed, format and unit, such as 9600 8N1 1')
-    return int(said[1]), said[2].upper(), int(said[3])
 
 
 def _allow(row: TableRow, access: str) -> None:

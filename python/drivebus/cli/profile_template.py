@@ -236,7 +236,7 @@ def files_of_answers(folder: str, answers: Answers) -> dict[str, str]:
     Its rows are taken as in `files_of_table`.
     """
     rules = answers.rules(folder, family_name(folder)) + "\n"
-    written = {"profile.toml": rules, "faults.csv": _FAULTS, _SCHEMA: drivebus.Profile.schema()}
+    written = {"profile.toml": rules, "faults.csv": _FAULTS + answers.fault_rows(), _SCHEMA: drivebus.Profile.schema()}
     return _with_rows(written, answers.table)
 
 

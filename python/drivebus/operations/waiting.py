@@ -29,8 +29,8 @@ async def wait_for_speed(
     """Waits until the output frequency is *hz*; None: the active setpoint.
 
     Args:
-        hz: Wanted output frequency in Hz. Where the drive tells which way the motor turns, that is the way in which this
-            program started it last: a motor that is reversed runs through its new speed before it turns round.
+        hz: Wanted output frequency in Hz. Where the drive tells which way the motor turns, that is the way in which
+            this program started it last: a motor that is reversed runs through its new speed before it turns round.
         tolerance: How far off it may be, in Hz.
         timeout: Seconds of the line's clock.
         unverified: Also by words that are not verified for the family.

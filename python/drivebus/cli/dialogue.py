@@ -1,0 +1,104 @@
+"""Questions on the terminal, one after the other, of which the last answer can be taken back."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import TypeVar
+
+import click
+
+from drivebus.cli.present.output import remark
+from drivebus.cli.wrong_use import WrongUse
+
+__all__ = ["Dialogue"]
+
+T = TypeVar("T")
+
+_BACK = "back"
+
+
+class _TakenBack(Exception):  # it is no error
+    """The last answer is not meant."""
+
+
+class Dialogue:
+    """What was asked and answered. To take an answer back, all before it is gone through again, in silence.
+
+    A question may be part of reading another answer: that answer is then taken back with it.
+    """
+
+    def __init__(self) -> None:
+        self._given: list[str] = []
+        self._place = 0
+
+    def held(self, ask: Callable[[], T]) -> T:
+        """What *ask* comes to, which asks by this dialogue, and begins anew each time that it is called."""
+        while True:
+            self._place = 0
+            try:
+                return ask()
+            except _TakenBack:
+                self._given.pop()
+
+    def needed(self, question: str, read: Callable[[str], T], default: str | None = None) -> T:
+        """What *read* makes of an answer, asked for until it can; Enter is *default*, if there is one.
+
+        Raises:
+            click.Abort: The input ended, or Ctrl-C was pressed.
+        """
+        if self._place < len(self._given):
+            return self._taken(self._given[self._place], read)
+
+        def heard(said: str) -> T:
+            if said.strip().lower() == _BACK:
+                if not self._given:
+                    raise WrongUse("this is the first question")
+                raise _TakenBack
+            before = len(self._given)
+            self._given.append(said)
+            try:
+                return self._taken(said, read)
+            except click.UsageError:
+                del self._given[before:]
+                self._place = before
+                raise
+
+        answer: T = click.prompt(question, default=default, show_default=bool(default), value_proc=heard, err=True)
+        return answer
+
+    def optional(self, question: str, read: Callable[[str], T]) -> T | None:
+        """As `needed`; None where Enter leaves it out."""
+        return self.needed(question, lambda said: read(said.strip()) if said.strip() else None, "")
+
+    def agreed(self, question: str, *, default: bool) -> bool:
+        """Yes or no."""
+        return self.needed(f"{question} [{'Y/n' if default else 'y/N'}]", lambda said: _agreed(said, default), "")
+
+    def pasted(self) -> str:
+        """Lines of the input, until a dot stands alone in one."""
+        if self._place == len(self._given):
+            remark("Paste it; then a dot on a line of its own.")
+            lines: list[str] = []
+            while (line := sys.stdin.readline()).strip() != "." and line:
+                lines.append(line)
+            self._given.append("".join(lines))
+        return self._taken(self._given[self._place], str)
+
+    def say(self, text: str) -> None:
+        """Says *text*, once."""
+        if self._place == len(self._given):
+            remark(text)
+
+    def _taken(self, said: str, read: Callable[[str], T]) -> T:
+        self._place += 1
+        return read(said)
+
+
+def _agreed(said: str, default: bool) -> bool:
+    if not said.strip():
+        return default
+    answer = {"y": True, "yes": True, "n": False, "no": False}.get(said.strip().lower())
+    if answer is None:
+        raise WrongUse(f'"{said.strip()}" is neither y nor n')
+    return answer
