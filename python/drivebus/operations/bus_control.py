@@ -22,7 +22,7 @@ from drivebus.profile.evidence import not_verified
 if TYPE_CHECKING:
     from drivebus.values import Control, ControlItem
 
-__all__ = ["check_control", "ignored", "item_of", "prepare_control", "shown"]
+__all__ = ["check_control", "ignored", "item_of", "prepare_control", "preparing", "shown"]
 
 
 async def check_control(unit: DriveView, setpoint: str | None = None, *, unverified: bool = False) -> Control:
@@ -148,3 +148,9 @@ def shown(unit: DriveView, settings: Iterable[Sequence[Any]]) -> Control:
     from drivebus.values import Control
 
     return Control(item_of(unit, row) for row in settings)
+
+
+def preparing(unit: DriveView) -> tuple[str | Advice, ...]:
+    """How to call what makes *unit* obey the bus. A family without a way to RAM alone has to be told to store."""
+    named = call("prepare_control")
+    return (named,) if unit.profile.memory() else (named, " with ", argument("store", True))

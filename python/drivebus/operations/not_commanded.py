@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from drivebus import tables
-from drivebus.advice import Text, call
+from drivebus.advice import Text
 from drivebus.errors import DrivebusError, NotReady, Refused, Unconfirmed
 from drivebus.operations import bus_control, glances, not_led_up, not_ready, not_written, setpoints
 from drivebus.operations.drive_view import DriveView
@@ -141,7 +141,7 @@ def _ignored(unit: DriveView, settings: list[Any]) -> Unconfirmed:
         Text(
             f"unit {unit.address} did not reset: it does not take commands from the bus ({ignored}). The reset was "
             "sent once; ",
-            call("prepare_control"),
+            *bus_control.preparing(unit),
             " sets the drive to obey the bus",
         ),
         unit=unit.address,

@@ -82,7 +82,7 @@ def in_words(unit: DriveView, command: str | None, kind: str, told: Any) -> Driv
             Text(
                 f"unit {unit.address} takes its commands from the {seen.source}, not from the bus; nothing that moves "
                 "it was sent. ",
-                call("prepare_control"),
+                *bus_control.preparing(unit),
                 " sets it to obey the bus",
             ),
             why="control_source",
@@ -134,7 +134,7 @@ def _settings(unit: DriveView, then: str, wrong: list[Any]) -> NotReady:
         Text(
             f"unit {unit.address} {_SET_OTHERWISE[then]}:\n"
             f"{bus_control.shown(unit, wrong)}\nNothing that moves it was sent. ",
-            call("prepare_control"),
+            *bus_control.preparing(unit),
             " sets what is needed",
         ),
         why="settings",
