@@ -24,6 +24,7 @@ VARIANTS = {
     "vfd500": {"speed_unit": "Hz"},
     "a1000": {"speed_unit": "Hz"},
     "j1000": {"speed_unit": "Hz"},
+    "cfw500": {"base_frequency": "50 Hz"},
     "fc51": {"base_frequency": "50 Hz"},
     "fc202": {"base_frequency": "50 Hz"},
     "v20": {"base_frequency": "50 Hz"},
@@ -49,6 +50,7 @@ READ_ONLY = {
     ),
     **dict.fromkeys(["a1000", "j1000"], 0x22),
     "e510": 0x05,
+    "cfw500": 0x03,
     # Its manual (1755863, p. 39) refuses a write of ETA so.
     "atv71": 0x04,
 }
@@ -72,6 +74,7 @@ OUT_OF_RANGE = {
             "sj200",
             "gs2",
             "gs4",
+            "cfw500",
         ],
         0x03,
     ),
@@ -89,6 +92,7 @@ WITHOUT = {
     "vfd500": {"jog_stop"},
     "md500": {"jog_stop"},
     "frenic": {"coast", "jog_forward", "jog_reverse", "jog_stop"},
+    "cfw500": {"jog_forward", "jog_reverse", "jog_stop"},
     "fr-d700": {"coast", "reset_fault", "jog_forward", "jog_reverse", "jog_stop"},
     "fc51": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
     "fc202": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},

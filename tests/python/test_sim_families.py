@@ -59,6 +59,7 @@ FAMILIES = {
     43: "atv71",
     44: "atv320",
     45: "gs4",
+    46: "cfw500",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]
@@ -272,6 +273,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "optidrive-e3",
             "gs2",
             "gs4",
+            "cfw500",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:

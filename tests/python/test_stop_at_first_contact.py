@@ -36,14 +36,16 @@ QUESTIONS = {
     # An Altivar 600 is asked for CHCF, too: in its I/O profile 07H runs it. By the other two names nobody would ask it,
     # so one more word tells that they are none.
     **dict.fromkeys(("atv312", "atv12", "atv320", "atv600", "atv71"), (7, 120)),
+    "cfw500": (8, 140),
     "frenic": (9, 158),
     "v20": (8, 140),
     # A WJ200 has its direction where this one stops.
     "sj200": (7, 125),
     # It is commanded where Goodrives and others have parameters, some of them without a code.
     "optidrive-e3": (8, 140),
-    # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there.
-    "acs355": (11, 187),
+    # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there; and for 02A8H,
+    # which a CFW500 has.
+    "acs355": (12, 203),
     "acs580": (9, 155),
     # Nothing is asked: what halts it says nothing to a drive of Modbus. The line is silent for 50 ms before.
     "huanyang-hy": (0, 55),

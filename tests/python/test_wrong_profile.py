@@ -67,6 +67,7 @@ SILENT_ON_CODES = [
     "optidrive-e3",
     "sj200",
     "e510",
+    "cfw500",
 ]
 """The families whose units refuse 2103H."""
 
@@ -75,6 +76,7 @@ SIGNED = [
     *("atv71", "atv320", "acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic", "e510"),
     "optidrive-e3",
     "sj200",
+    "cfw500",
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -113,6 +115,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "a1000": ["a1000"],
     # And this one 0020H and 0023H; a real A1000 may answer them, too.
     "j1000": ["j1000"],
+    # And this one 02A8H and 02AAH; an ACS355, whose other words it has, refuses the first.
+    "cfw500": ["cfw500"],
     # And this one FD00H and FD01H.
     "vf-s15": ["vf-s15"],
     # And this one 080EH and 0809H.

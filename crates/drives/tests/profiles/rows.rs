@@ -213,6 +213,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("gs2", 43),
         ("gs4", 54),
         ("j1000", 17),
+        ("cfw500", 29),
         ("chv100", 24),
         ("e510", 68),
         ("eds300", 17),

@@ -106,7 +106,8 @@ fn of_the_shipped_profiles_only_six_words_say_two_things() {
                         "j1000",
                         "vf-s15",
                         "optidrive-e3",
-                        "e510"
+                        "e510",
+                        "cfw500"
                     ]
                     .contains(&name),
                 "{name}: {raw:04X}H is {said:?}"

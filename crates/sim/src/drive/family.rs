@@ -17,6 +17,7 @@ mod atv312;
 mod atv320;
 mod atv600;
 mod atv71;
+mod cfw500;
 mod chf100a;
 mod e510;
 mod eds300;
@@ -161,7 +162,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 45] = [
+const FAMILIES: [fn() -> Family; 46] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -183,6 +184,7 @@ const FAMILIES: [fn() -> Family; 45] = [
     md500::md500,
     a1000::a1000,
     j1000::j1000,
+    cfw500::cfw500,
     saj8000m::saj8000m,
     eds300::eds300,
     sunfar::e300,

@@ -205,6 +205,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "j1000",
         "e510",
         "vf-s15",
+        "cfw500",
         "frenic",
         "optidrive-e3",
     ] {

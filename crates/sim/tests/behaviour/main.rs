@@ -27,5 +27,6 @@ mod running;
 mod teco;
 mod toshiba;
 mod vfd500;
+mod weg;
 mod wire;
 mod yaskawa;
