@@ -279,7 +279,7 @@ def test_at_another_level_of_access_nothing_is_started_and_nothing_set(line: Sim
                 drive.run(hz, reverse=reverse)
         with pytest.raises(NotAllowed, match=rf"LAC of unit 1 is {level}, and must be 2 .*Fr1, Cd1, CHCF and tCC"):
             drive.prepare_control(store=True)
-        assert [item.ok for item in drive.check_control()] == [False, True]
+        assert [item.ok for item in drive.check_control()] == [False, True, True]
         assert len(line.drive(1).writes()) == before
         # A stop asks for nothing.
         drive.stop(confirm=0)
@@ -298,3 +298,24 @@ def test_the_command_line_says_the_words() -> None:
     assert result.exit_code == 2
     assert "16 at 2135H is not a command" in result.stderr
     assert "080FH run reverse" in result.stderr
+
+
+@pytest.mark.parametrize("family", ["atv12", "atv312", "atv320", "atv600", "atv71"])
+def test_where_a_setpoint_would_count_otherwise_none_is_sent(family: str) -> None:
+    """Bit 9 of CMI (BBV51701, p. 20; AAV49428, p. 85), which another master may set: a count is no tenth of a hertz."""
+    with Simulator({1: family}, transport="process", clock="virtual") as line, Bus(line) as bus:
+        drive = bus.drive(1, family, unverified=True)
+        drive.prepare_control(store=True)
+        drive.run(5.0)
+        bus.write(1, CMI, 0x0200, force=True)
+        told = len(line.drive(1).writes())
+        for order in (lambda: drive.run(10.0), lambda: drive.prepare_control(store=True)):
+            with pytest.raises(NotAllowed, match=r"bit 9: setpoints count 0\.1 Hz"):
+                order()
+        assert len(line.drive(1).writes()) == told
+        # It is stopped all the same.
+        drive.stop()
+        drive.wait_until_stopped()
+        bus.write(1, CMI, 0, force=True)
+        drive.run(5.0)
+        drive.wait_for_speed(5.0)

@@ -122,7 +122,7 @@ def test_without_fr1_it_is_not_started_and_needs_no_level_of_access(line: Simula
         with pytest.raises(NotAllowed, match=r"Fr1 .*: 1, needs 164"):
             drive.run(10.0)
         assert line.drive(1).writes() == []
-        assert [item.code for item in drive.check_control()] == ["Fr1"]
+        assert [item.code for item in drive.check_control()] == ["Fr1", "extended_control_word"]
 
 
 def test_a_fault_has_the_numbers_of_lft_and_is_over_with_the_reset(line: Simulator, drive: Drive) -> None:

@@ -225,7 +225,7 @@ impl Unit {
         let Some(frequency) = frequency else { return Ok(Payload::Word(code)) };
         let register = self.frequency_register().and_then(drivebus_drives::Entry::place);
         let is_next = register.is_some_and(|register| register.number() == place.number() + 1);
-        let takes_two = self.profile().functions().contains(&WRITE_MANY) && self.profile().max_words() > 1;
+        let takes_two = self.profile().functions().contains(&WRITE_MANY) && self.profile().requests().max_written > 1;
         if is_next && takes_two {
             return Ok(Payload::Words(vec![code, frequency]));
         }

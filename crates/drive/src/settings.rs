@@ -107,6 +107,15 @@ impl Unit {
         let readable: Vec<_> = entries.iter().copied().flatten().collect();
         let mut values = if readable.is_empty() { Vec::new() } else { self.values(line, &readable).await? }.into_iter();
         let pairs = wanted.into_iter().zip(entries);
-        Ok(pairs.map(|(wanted, entry)| Setting { wanted, actual: entry.and_then(|_| values.next()) }).collect())
+        let actual = |row: &Control, entry: &Entry, value: Value| match row.bits {
+            None => value,
+            // A word of bits has all of them.
+            Some(_) => entry.decode(row.found(u16::try_from(value.count() & 0xFFFF).unwrap_or_default())),
+        };
+        let setting = |(wanted, entry): (Control, Option<&Entry>)| Setting {
+            actual: entry.and_then(|entry| values.next().map(|value| actual(&wanted, entry, value))),
+            wanted,
+        };
+        Ok(pairs.map(setting).collect())
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use drivebus_drives::{Entry, Profile, ReadPlan, Setpoint, State};
+use drivebus_drives::{Control, Entry, Profile, ReadPlan, Setpoint, State};
 use drivebus_rtu::UnitAddress;
 
 use crate::rule::Rule;
@@ -34,8 +34,8 @@ enum Told {
     Time,
     /// Hertz that it is counted from.
     Start,
-    /// The word that a setting has where only the bus commands the drive.
-    Setting(u16),
+    /// What these bits of a setting are where only the bus commands the drive.
+    Setting { mask: u16, word: u16 },
 }
 
 /// The frequencies of one moment, whichever way the motor turns.
@@ -69,7 +69,11 @@ impl Speeds {
         let both = frequency.map(|frequency| std::iter::once(frequency).chain(setpoint).collect::<Vec<_>>());
 
         let settings = wanted_for(profile, Setpoint::Frequency);
-        let set = settings.iter().filter_map(|each| Some((profile.find(&each.code).ok()?, Told::Setting(each.raw))));
+        let setting = |each: &Control| {
+            let low = each.bits.map_or(0, |[_, low]| low);
+            Told::Setting { mask: each.found(u16::MAX) << low, word: each.raw << low }
+        };
+        let set = settings.iter().filter_map(|each| Some((profile.find(&each.code).ok()?, setting(each))));
         let ramp = [("deceleration", Told::Time), ("ramp_start", Told::Start)];
         let ramp = ramp.into_iter().filter_map(|(role, told)| Some((profile.role(role)?, told)));
         let (entries, told): (Vec<_>, Vec<_>) = set.chain(ramp).filter(|(entry, _)| readable(entry)).unzip();
@@ -149,7 +153,7 @@ impl Speeds {
             match *told {
                 Told::Time => seconds = value,
                 Told::Start => hertz = value,
-                Told::Setting(word) => set += usize::from(count == i64::from(word)),
+                Told::Setting { mask, word } => set += usize::from(count & i64::from(mask) == i64::from(word)),
             }
         }
         Ok(Ramp {

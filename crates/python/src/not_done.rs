@@ -141,11 +141,12 @@ fn led_up_told(py: Python<'_>, why: WhyNotLedUp<Failed>) -> PyResult<Told> {
     })
 }
 
-/// A setting: its code, the word it must hold and the one it holds, label, note, and whether it is verified and set by hand.
-pub(crate) fn setting(setting: Setting) -> (String, u16, Option<i64>, String, String, bool, bool) {
+/// A setting: its code, the word it must hold and the one it holds, label, note, and whether it is verified, is set by hand, and is
+/// only some bits of its word.
+pub(crate) fn setting(setting: Setting) -> (String, u16, Option<i64>, String, String, bool, bool, bool) {
     let actual = setting.actual.map(drivebus_drives::Value::count);
     let wanted = setting.wanted;
-    (wanted.code, wanted.raw, actual, wanted.label, wanted.note, wanted.verified, wanted.by_hand)
+    (wanted.code, wanted.raw, actual, wanted.label, wanted.note, wanted.verified, wanted.by_hand, wanted.bits.is_some())
 }
 
 /// A look after something came to nothing, or the exception instead of one.

@@ -84,6 +84,7 @@ fn bits<'py>(py: Python<'py>, entry: &Entry) -> PyResult<Option<Bound<'py, PyDic
 pub(crate) fn requests<'py>(py: Python<'py>, requests: &Requests) -> Table<'py> {
     let dict = PyDict::new(py);
     dict.set_item("protocol", requests.protocol.name())?;
+    dict.set_item("max_written", requests.max_written)?;
     dict.set_item("joined", &requests.joined)?;
     dict.set_item("across_groups", requests.across_groups)?;
     dict.set_item("single_parameters", requests.single_parameters)?;
@@ -155,6 +156,7 @@ pub(crate) fn items<'py>(py: Python<'py>, profile: &Profile, rows: &[Control]) -
         let entry = profile.find(&row.code).map_err(refuse)?;
         let dict = PyDict::new(py);
         dict.set_item("code", &row.code)?;
+        dict.set_item("bits", row.bits.map(|[high, low]| (high, low)))?;
         dict.set_item("value", number(py, entry.quantity(), entry.decode(row.raw)))?;
         dict.set_item("label", &row.label)?;
         dict.set_item("always", row.always)?;

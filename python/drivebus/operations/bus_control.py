@@ -88,10 +88,10 @@ def _not_prepared(unit: DriveView, kind: str, told: Any, *, store: bool) -> Driv
             f"{item.code} of unit {unit.address} is {int(item.actual or 0)}, and must be {int(item.wanted)} "
             f"({item.label}). ",
             call("prepare_control"),
-            f" does not set it: {item.note} Nothing was written. If {int(item.wanted)} is meant, ",
-            call("write"),
-            f" {item.code} first, with ",
-            argument("store", True),
+            f" does not set it: {item.note} Nothing was written",
+            # A word of which only some bits count has others that are somebody else's.
+            *(() if told[-1] else (f". If {int(item.wanted)} is meant, ", call("write"), f" {item.code} first, with ")),
+            *(() if told[-1] else (argument("store", True),)),
         ),
         why="settings",
         unit=unit.address,
@@ -118,7 +118,7 @@ def item_of(unit: DriveView, row: Sequence[Any]) -> ControlItem:
     """A setting of *unit*, of which the core told this *row*."""
     from drivebus.values import ControlItem
 
-    code, wanted, actual, label, note, verified, _ = row
+    code, wanted, actual, label, note, verified, *_ = row
     return ControlItem(
         code=code,
         wanted=registers.value(unit, code, wanted),

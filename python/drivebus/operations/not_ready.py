@@ -130,12 +130,15 @@ def _bad_link(unit: DriveView, link: Link, lost: int, looks: int) -> BadLink:
 
 
 def _settings(unit: DriveView, then: str, wrong: list[Any]) -> NotReady:
+    by_hand = [bus_control.item_of(unit, row) for row in wrong if row[6]]
+    advice: tuple[str | Advice, ...] = (*bus_control.preparing(unit), " sets what is needed")
+    if len(by_hand) == len(wrong):
+        advice = (f"{by_hand[0].code} is set by hand: {by_hand[0].note.rstrip('.')}",)
     return NotReady(
         Text(
             f"unit {unit.address} {_SET_OTHERWISE[then]}:\n"
             f"{bus_control.shown(unit, wrong)}\nNothing that moves it was sent. ",
-            *bus_control.preparing(unit),
-            " sets what is needed",
+            *advice,
         ),
         why="settings",
         unit=unit.address,

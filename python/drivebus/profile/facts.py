@@ -59,6 +59,7 @@ class RequestRules(_Fact):
 
     Attributes:
         protocol: `"modbus"`, or `"huanyang"`: that maker's own, of which each register stands for something.
+        max_written: Most words in one write.
         joined: Where it is printed that one 10H request may write several parameters; None where it is not.
         across_groups: Whether a read may leave its group of parameters.
         single_parameters: Whether a read may have one parameter and no more.
@@ -70,6 +71,7 @@ class RequestRules(_Fact):
     """
 
     protocol: str
+    max_written: int
     joined: str | None
     across_groups: bool
     single_parameters: bool
@@ -147,8 +149,9 @@ class Setting(_Fact):
     """A parameter that has to have a value before the drive obeys the bus, or takes a setpoint.
 
     Attributes:
-        code: The parameter.
-        value: The word that it must hold.
+        code: The parameter, or the name of a register.
+        bits: The highest and the lowest of the bits that count; None where all do.
+        value: The word that it must hold, or what those bits must.
         label: What it is called.
         always: Whether it is looked at before each start.
         by_hand: Whether `Drive.prepare_control` leaves it alone.
@@ -158,6 +161,7 @@ class Setting(_Fact):
     """
 
     code: str
+    bits: tuple[int, int] | None
     value: int
     label: str
     always: bool

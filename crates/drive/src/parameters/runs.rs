@@ -29,7 +29,7 @@ pub(super) fn runs<'r, 'p>(profile: &Profile, planned: &'r [Planned<'p>]) -> Vec
 fn may_follow(profile: &Profile, run: &[Planned<'_>], item: &Planned<'_>) -> bool {
     let Some(last) = run.last() else { return false };
     let is_next = item.place.table == last.place.table && last.place.address.checked_add(1) == Some(item.place.address);
-    if !is_next || run.len() >= usize::from(profile.max_words()) || profile.requests().joined.is_none() {
+    if !is_next || run.len() >= usize::from(profile.requests().max_written) || profile.requests().joined.is_none() {
         return false;
     }
     let alone = alone(profile);

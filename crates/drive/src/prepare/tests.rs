@@ -88,6 +88,25 @@ fn what_is_set_by_hand_is_left_to_who_writes_it() {
     }
 }
 
+/// Altivar 312 communication variables manual, p. 20: with bit 9 of CMI, setpoints count otherwise. Bit 14 is about something else.
+#[test]
+fn of_a_word_with_other_bits_only_those_that_count_are_looked_at() {
+    for (cmi, is_left) in [(0x0200, true), (0x4200, true), (0x4000, false), (0, false)] {
+        let place = |name| shipped("atv312").profile().find(name).unwrap().address().unwrap();
+        let words = [(place("LAC"), 2), (place("Fr1"), 164), (place("extended_control_word"), cmi)];
+        let mut bench = Bench::of("atv312", &words);
+        let done = bench.prepare(Setpoint::Frequency, Store::Eeprom);
+        assert_eq!(bench.script.sent, []);
+        match done {
+            Err(NotPrepared::ByHand(setting)) if is_left => {
+                let said = "extended_control_word is 1, and must be 0 (bit 9: setpoints count 0.1 Hz)";
+                assert_eq!(setting.to_string(), said);
+            }
+            done => assert!(!is_left && done.is_ok(), "{cmi:04X}H: {done:?}"),
+        }
+    }
+}
+
 #[test]
 fn a_drive_that_keeps_what_it_had_is_told_of() {
     let mut refusing = Bench::gd350_set([0, 0, 0]);

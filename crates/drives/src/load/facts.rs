@@ -170,6 +170,14 @@ pub(super) fn control(
         if !row.otherwise.is_empty() && !row.always {
             problems.add(file, line(file, spanned), "what decides the words of commands needs \"always = true\"");
         }
+        if let Some([high, low]) = row.bits {
+            let has_others = !row.same.is_empty() || !row.otherwise.is_empty();
+            if high > 15 || low > high || !row.by_hand || has_others || row.value >> (high - low.min(high) + 1) != 0 {
+                let reason = "\"bits\" are [highest, lowest] of 15 to 0, hold \"value\", and need \"by_hand = true\", without \"same\" and \"otherwise\"";
+                problems.add(file, line(file, spanned), reason);
+                continue;
+            }
+        }
         let mut word = |line, value| problems.keep(check(file, line, &entry.quantity, &entry.name, value));
         let raw = word(line(file, spanned), row.value);
         let same = row.same.iter().filter_map(|&value| word(line(file, spanned), value)).collect::<Vec<_>>();
@@ -194,6 +202,7 @@ pub(super) fn control(
         }
         known.extend(raw.map(|raw| Control {
             code: entry.name.clone(),
+            bits: row.bits,
             raw,
             label: row.label.clone(),
             always: row.always,

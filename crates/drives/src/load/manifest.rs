@@ -145,6 +145,8 @@ pub(super) struct Requests {
     pub(super) functions: Vec<u8>,
     /// Most words in one request, 1 to 125.
     pub(super) max_words: Placed<u16>,
+    /// Most words in one write, 1 to 123, where it takes fewer than in a read.
+    pub(super) max_written: Option<Placed<u16>>,
     /// Where it is printed that one 10H request may write several parameters: document and page. Each is written by its own
     /// request where this is left out.
     pub(super) joined: Option<Placed<String>>,

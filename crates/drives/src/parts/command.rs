@@ -120,9 +120,11 @@ pub struct ParseCommandError {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Control {
-    /// The parameter's code: `P00.01`.
+    /// The parameter's code: `P00.01`. A register's name, where that decides.
     pub code: String,
-    /// The word it must hold.
+    /// The highest and the lowest of the bits that count; `None`: all of them.
+    pub bits: Option<[u8; 2]>,
+    /// The word it must hold, or what those bits must.
     pub raw: u16,
     /// What this value means.
     pub label: String,
@@ -145,6 +147,11 @@ pub struct Control {
 }
 
 impl Control {
+    /// What counts of the word `raw`.
+    pub fn found(&self, raw: u16) -> u16 {
+        self.bits.map_or(raw, |[high, low]| (raw << (15 - high)) >> (15 - high + low))
+    }
+
     /// Whether it decides what the words of commands mean.
     pub fn decides_words(&self) -> bool {
         !self.otherwise.is_empty()

@@ -54,8 +54,10 @@ pub struct Requests {
     pub protocol: Protocol,
     /// The function codes that it takes.
     pub functions: Vec<u8>,
-    /// Most words in one read or write, 1..=125.
+    /// Most words in one read, 1..=125.
     pub max_words: u16,
+    /// Most words in one write, 1..=123: no more than in a read.
+    pub max_written: u16,
     /// Where it is printed that one 10H request may write several parameters; `None` where it is not printed.
     pub joined: Option<String>,
     /// Whether a read may run from one parameter group into the next.

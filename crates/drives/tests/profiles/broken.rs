@@ -53,6 +53,8 @@ fn every_mistake_names_file_line_and_reason() {
         // What profile.toml says by itself.
         ("profile.toml", "name = \"gd350\"", "name = \"GD 350\"", "GD 350"),
         ("profile.toml", "max_words = 16", "max_words = 0", "1 to 125"),
+        ("profile.toml", "max_words = 16", "max_words = 16\nmax_written = 17", "1 to 16"),
+        ("profile.toml", "max_words = 16", "max_words = 16\nmax_written = 0", "1 to 16"),
         ("profile.toml", ", 0x10]\nmax_words = 16\n", "]\nmax_words = 16\n", "\"functions\" has no 0x10"),
         (
             "profile.toml",
@@ -207,4 +209,28 @@ fn a_watchdog_may_be_missing_and_must_not_be_empty() {
     assert_ne!(idle, table);
     copy.write("profile.toml", format!("{before}[watchdog]{idle}\n\n{after}"));
     assert!(copy.load().unwrap_err().to_string().contains("needs the value of \"coast\" or of \"stop\""));
+}
+
+#[test]
+fn what_counts_of_a_word_are_some_of_its_bits_that_nobody_sets_from_here() {
+    let copy = copy("bits-of-a-setting");
+    let text = shipped("profile.toml");
+    let (before, after) = text.split_once("[[control]]\n").unwrap();
+    let load = |rows: &str| {
+        copy.write("profile.toml", format!("{before}[[control]]\n{rows}\n{after}"));
+        copy.load().map(|profile| profile.control().first().map(|row| (row.found(0xFA5F), row.bits)))
+    };
+    assert_eq!(load("bits = [6, 4]\nby_hand = true").unwrap(), Some((0b101, Some([6, 4]))));
+    assert_eq!(load("bits = [15, 0]\nby_hand = true").unwrap(), Some((0xFA5F, Some([15, 0]))));
+    assert_eq!(load("").unwrap(), Some((0xFA5F, None)));
+    for wrong in [
+        "bits = [4, 6]\nby_hand = true",
+        "bits = [16, 4]\nby_hand = true",
+        "bits = [0, 0]\nby_hand = true", // the value is 2
+        "bits = [6, 4]",
+        "bits = [6, 4]\nby_hand = true\nsame = [3]",
+    ] {
+        let said = load(wrong).unwrap_err().to_string();
+        assert!(said.contains("\"bits\" are [highest, lowest]"), "{wrong}: {said}");
+    }
 }

@@ -181,7 +181,11 @@ impl Drive {
                 self.write(now, spot(Table::Coil, address), Words::new(&[on.into()]))?;
             }
             Request::WriteMultiple { address, words, .. } => {
-                self.check_count(u16::try_from(words.len()).unwrap_or(u16::MAX))?;
+                let count = u16::try_from(words.len()).unwrap_or(u16::MAX);
+                self.check_count(count)?;
+                if self.family().roles.max_written.is_some_and(|most| count > most) {
+                    return Err(Refusal::Structure);
+                }
                 self.write(now, address.into(), words)?;
             }
             // Assumption: the echo works on a locked drive; it reads and writes nothing.

@@ -93,6 +93,8 @@ def _line(profile: drivebus.Profile) -> list[str]:
     lines = [f"functions {functions}; {words} in one request at most{_doubt(requests.verified, requests.note)}"]
     if requests.protocol == "huanyang":
         lines.append(f"speaks {huanyang.NAME}, and no Modbus")
+    if requests.max_written < min(profile.max_words, 123):
+        lines.append(f"{requests.max_written} words in one write at most")
     if requests.joined:
         lines.append("one request may write several parameters")
     if not requests.across_groups:

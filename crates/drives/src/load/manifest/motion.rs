@@ -163,9 +163,11 @@ pub(in crate::load) struct When {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(in crate::load) struct Control {
-    /// Its code.
+    /// Its code; a register by its name.
     pub(in crate::load) code: String,
-    /// The value, in counts.
+    /// The highest and the lowest of the bits that count, where the others are somebody else's; it is then not set from here.
+    pub(in crate::load) bits: Option<[u8; 2]>,
+    /// The value, in counts; that of the bits, where there are any.
     pub(in crate::load) value: i64,
     /// What that means.
     pub(in crate::load) label: String,

@@ -55,6 +55,7 @@ pub(crate) fn atv312() -> Family {
         factory: &[],
         capped: &[],
         roles: Roles {
+            max_written: Some(27),
             obeys: vec![(ACCESS_LEVEL, 2), (SETPOINT_SOURCE, MODBUS)],
             speed: Some(Speed { register: 8502, unit: None, usual: SPEED }),
             max_frequency: Some(Scaled::tenths(MAX_FREQUENCY)),

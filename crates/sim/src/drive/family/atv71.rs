@@ -75,6 +75,7 @@ pub(crate) fn atv71() -> Family {
         capped: &[],
         roles: Roles {
             absent: Some(Absent { word: 0x8000, alone: false }),
+            max_written: Some(61),
             obeys: vec![(CONTROL_MODE, 1), (SETPOINT_SOURCE, MODBUS)],
             other_words: Some(OtherWords { set_by: (CONTROL_MODE, 3), decode: by_inputs }),
             speed: Some(Speed { register: SETPOINT, unit: None, usual: SPEED }),

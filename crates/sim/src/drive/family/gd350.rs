@@ -70,6 +70,7 @@ pub(crate) fn gd350() -> Family {
             other_words: None,
             reads_single_parameters: false,
             absent: None,
+            max_written: None,
         },
         delay: USUAL_DELAY,
         max_hertz: USUAL_MAX_HZ,

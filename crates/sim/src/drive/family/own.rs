@@ -63,6 +63,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         max_frequency,
         handshake,
         reads_single_parameters: profile.requests().single_parameters,
+        max_written: Some(profile.requests().max_written),
         absent: profile.requests().absent.map(|word| Absent { word, alone: true }),
         protocol: match profile.requests().protocol {
             drivebus_drives::Protocol::Huanyang => Protocol::Huanyang,
@@ -232,7 +233,8 @@ impl Own<'_> {
     /// The parameters that must have a value, and which.
     fn conditions(&mut self, rows: &[Control]) -> Vec<(u16, u16)> {
         let mut conditions = Vec::new();
-        for row in rows {
+        // Which way its bits go is not known of a drive of one's own.
+        for row in rows.iter().filter(|row| row.bits.is_none()) {
             match self.address_of(&row.code) {
                 Some(address) => conditions.push((address, row.raw)),
                 None => self.miss("parameters.csv", &format!("{} has no address, and must have a value", row.code)),

@@ -50,6 +50,8 @@ pub(crate) struct Roles {
     pub(crate) other_words: Option<OtherWords>,
     /// Whether a read may have one parameter and no more.
     pub(crate) reads_single_parameters: bool,
+    /// Most words in one write, where they are fewer than in a read.
+    pub(crate) max_written: Option<u16>,
     /// The word that a read has where the drive has nothing, instead of being refused.
     pub(crate) absent: Option<Absent>,
 }
@@ -214,5 +216,6 @@ impl Roles {
         other_words: None,
         reads_single_parameters: false,
         absent: None,
+        max_written: None,
     };
 }

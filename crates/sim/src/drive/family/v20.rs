@@ -29,7 +29,7 @@ pub(crate) fn v20() -> Family {
         name: "v20".into(),
         kind: Kind::Inverter,
         functions: vec![0x03, 0x06, 0x10],
-        max_words: 123,
+        max_words: 125,
         across_groups: true,
         exception: by_the_specification,
         memory: Memory::EepromOnly,
@@ -43,6 +43,7 @@ pub(crate) fn v20() -> Family {
         factory: &[],
         capped: &[],
         roles: Roles {
+            max_written: Some(123),
             speed: Some(Speed {
                 register: 0x0064,
                 unit: Some(Deciding::Share(Scaled::hundredths(REFERENCE), COUNTS)),
