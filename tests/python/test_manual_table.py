@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import drivebus
 from drivebus.cli import cli
 from drivebus.cli.manual_table import ManualTable
+from drivebus.cli.wrong_use import WrongUse
 
 ACME = """\
 Register address,Function description,Unit,Range,R/W
@@ -253,3 +254,82 @@ def test_no_table_brings_it_down(cells: list[list[str]]) -> None:
         return
     places = [(row.table, row.address) for row in table.rows]
     assert len(places) == len({*places}) == len({row.name for row in table.rows})
+
+
+@pytest.mark.parametrize(
+    ("said", "choices"),
+    [
+        ("0 keypad 1 terminals 2 bus", {0: "keypad", 1: "terminals", 2: "bus"}),
+        ("0 off, 1 on", {0: "off", 1: "on"}),
+        ("0 keypad 1 terminals 3 bus", {0: "keypad", 1: "terminals", 3: "bus"}),
+        # Values and their units, ends of a range, a choice alone, and numbers that do not count up.
+        ("0 Hz 60 Hz", {}),
+        ("0 to 10 V", {}),
+        ("0 V 1 A", {}),
+        ("1 keypad", {}),
+        ("1 run 0 stop", {}),
+        ("5 slow 6 fast", {}),
+        ("0 ... 3", {}),
+    ],
+)
+def test_values_without_signs_are_taken_where_they_count_up(said: str, choices: dict[int, str]) -> None:
+    table = f"Code,Address,Name,Range\nP00.01,0001H,Source,{said!r}\n".replace("'", '"')
+    (row,) = ManualTable().read(table.encode(), "p. 1")
+    assert row.choices == choices
+
+
+@pytest.mark.parametrize(
+    ("said", "access"),
+    [
+        ("any time", "run"),
+        ("while running", "run"),
+        ("stopped", "stop"),
+        ("Only when stopped", "stop"),
+        ("R", "ro"),
+        # That it can be written does not tell when.
+        ("R/W", "unknown"),
+        ("yes", "unknown"),
+        ("not while running", "unknown"),
+    ],
+)
+def test_when_a_parameter_may_be_written_is_taken_where_it_is_said(said: str, access: str) -> None:
+    (row,) = ManualTable().read(f"Code,Address,Name,Change\nP00.01,0001H,Source,{said}\n".encode(), "p. 1")
+    assert row.access == access
+
+
+def test_a_cell_goes_on_in_the_next_line_and_only_there() -> None:
+    text = """\
+Address  Name           Unit
+1000H    Speed          0.01 Hz
+         of the motor
+1001H    Current        0.1 A,
+                        signed
+1002H    Torque         0.1 %, up to 300
+"""
+    rows = ManualTable().read(text.encode(), "p. 1")
+    assert [(row.label, row.unit, row.scale, row.signed) for row in rows] == [
+        ("Speed of the motor", "Hz", 100, False),
+        ("Current", "A", 10, True),
+        ("Torque", "%", 10, False),
+    ]
+    assert rows[2].notes == ["the table says 'up to 300'"]
+
+
+def test_what_no_column_is_for_is_named_and_titles_that_stand_too_close() -> None:
+    table = ManualTable()
+    table.read(b"Address,Name,Group\n1000H,Speed,A\n", "p. 1")
+    assert table.unused == ["Group"]
+    with pytest.raises(WrongUse, match='"Register Name" may be two columns'):
+        table.read(b"Code  Register Name   Unit\nP00.01  1000H  Speed  Hz\n", "p. 1")
+
+
+@pytest.mark.parametrize("high", ["P00.03", "P09.99"])
+def test_a_parameter_may_be_the_end_of_a_range_if_there_is_such(tmp_path: Path, high: str) -> None:
+    text = (
+        f"Address,Code,Name,Unit,Range\n1001H,,Speed,0.01 Hz,0 ... {high}\n"
+        "0003H,P00.03,Highest frequency,0.01 Hz,10.00-400.00\n"
+    )
+    assert new(tmp_path, text).exit_code == 0
+    (row,) = rows(tmp_path)
+    known = high == "P00.03"
+    assert (row["high_from"], row["note"]) == ((high, "") if known else ("", "the table has the range 0 to P09.99"))

@@ -248,9 +248,7 @@ def _columns(titles: Sequence[str], *, by_code: bool) -> dict[str, int]:
 
 
 def _is_joined(title: str) -> bool:
-    """Whether *title* is no title, and each word of it is one."""
-
-    def is_one(text: str) -> bool:
-        return any(re.fullmatch(words, text) for words in _TITLES.values())
-
-    return not is_one(title.lower()) and all(map(is_one, title.lower().split()))
+    """Whether *title* is several words, each of them a title, and one that of the addresses."""
+    words = title.lower().split()
+    known = [next((what for what, named in _TITLES.items() if re.fullmatch(named, word)), None) for word in words]
+    return len(words) > 1 and None not in known and "address" in known
