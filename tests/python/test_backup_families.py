@@ -25,7 +25,9 @@ def parameters(family: str) -> list[str]:
 def can_be_set(family: str) -> bool:
     """Not so of an A1000: what is written to it takes an Enter command, which nobody gives here."""
     profile = drivebus.Profile.builtin(family)
-    return any(profile.describe(name).writable for name in parameters(family))
+    # Two words are read, and written by their name alone.
+    rows = map(profile.describe, parameters(family))
+    return any(row.writable and row.words == 1 for row in rows)
 
 
 WITH = [family for family in drivebus.profiles() if can_be_set(family)]

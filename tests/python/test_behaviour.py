@@ -223,7 +223,9 @@ class TestRunning:
     ) -> None:
         with pytest.raises(reason, match="inside"), obedient.running(hz=5.0):
             raise reason("inside")
-        assert commands(simulator) == [FORWARD, STOP]
+        start, *stops = commands(simulator)
+        # One that is not proved in time, on a machine that has no time for the drive, goes out again.
+        assert (start, set(stops)) == (FORWARD, {STOP})
         assert obedient.wait_until_stopped(timeout=10).state is State.STOPPED
 
     def test_a_block_whose_start_is_refused_sends_nothing(self, simulator: Simulator, drive: Drive) -> None:

@@ -156,3 +156,30 @@ def test_it_is_known_by_what_it_answers(line: Simulator) -> None:
     with Bus(line) as bus:
         found = bus.identify(1)
     assert (found.certainty, found.candidates) == ("by answers", ("fc51",))
+
+
+def test_a_value_of_two_words_goes_by_one_request_the_high_one_first(line: Simulator, drive: Drive) -> None:
+    """3-42 is at 0D5BH (MG.02.A4.02, p. 34). 700 s are 70000 hundredths, 00011170H."""
+    for seconds, words in ((20.5, "00 00 08 02"), (700.0, "00 01 11 70"), (20.5, "00 00 08 02")):
+        drive.write("3-42", seconds, store=True)
+        assert sent(line, 0x10)[-1] == f"01 10 0D 5B 00 02 04 {words}"
+        assert drive.read("3-42") == seconds
+    # What it has already is not stored once more.
+    drive.write("3-42", 20.5, store=True)
+    assert len(sent(line, 0x10)) == 3
+    with pytest.raises(NotAllowed, match=r"out of range, allowed is 0.00 to 42949672.95 s"):
+        drive.write("3-42", 5e7, store=True)
+    with pytest.raises(NotAllowed, match=r"finer than the drive counts; the nearest allowed are 0.00 and 0.01 s"):
+        drive.write("3-42", 0.001, store=True)
+    drive.prepare_control()
+    drive.run(hz=5.0)
+    with pytest.raises(NotAllowed, match="only while the drive is stopped"):
+        drive.write("3-42", 30, store=True)
+    drive.stop()
+    drive.wait_until_stopped(timeout=30)
+    assert len(sent(line, 0x10)) == 3
+    # A restore does not write it, and says so.
+    saved = drive.backup()
+    drive.write("3-42", 10.0, store=True)
+    drive.restore(saved)
+    assert drive.read("3-42") == 10.0

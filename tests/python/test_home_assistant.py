@@ -88,7 +88,7 @@ def a_sensor(given: dict[str, Any]) -> None:
 def test_every_unit_has_its_class() -> None:
     """Or Home Assistant has none for it."""
     units = {Profile.find(family).describe(name).unit for family in profiles() for name in Profile.find(family).names()}
-    without = {"", "raw", "%", "rpm", "Nm", "Ω", "mH"}
+    without = {"", "raw", "%", "rpm", "Nm", "Ω", "mH", "°"}
     classes = {unit for kind in TAKES["sensor_units"].values() for unit in kind} - {""}
     assert units - without <= classes
     assert not (without & classes)

@@ -145,6 +145,8 @@ def test_identification_is_the_family_s_own_or_refused(bus: Bus) -> None:
             assert read(bus, family, 0x2103) == [codes[family]]
         elif family in ("ms300", "vfd-e", "gs2", "gs4"):  # its output frequency: manuals, pp. 799 and 4-126
             assert read(bus, family, 0x2103) == [0]
+        elif family == "atv320":  # it refuses no read
+            assert read(bus, family, 0x2103) == [0x8000]
         elif family == "eds300":  # 03H says that there is no such address: manual, p. 45
             assert refusal(bus, family, pdu(0x03, 0x2103, 1)) == 0x03
         else:

@@ -85,9 +85,9 @@ fn check_deciding<E>(profile: &Profile, wanted: &[(&str, Input<'_>)]) -> Result<
             return Err(Why::Decides { name: (*name).to_owned(), other: (*other).to_owned() });
         }
         let Some(choice) = profile.chosen().get(variant) else { continue };
-        let word =
-            entry.encode(*value).map_err(|why| Why::NotPlanned(NotPlanned::of(name, WhyNotPlanned::Unfit(why))))?;
-        if profile.choice_of(variant, word.into()).as_ref() != Some(choice) {
+        let words = entry.encode_words(*value);
+        let words = words.map_err(|why| Why::NotPlanned(NotPlanned::of(name, WhyNotPlanned::Unfit(why))))?;
+        if profile.choice_of(variant, entry.raw(&words)).as_ref() != Some(choice) {
             let (name, variant, choice) = ((*name).to_owned(), variant.clone(), choice.clone());
             return Err(Why::Unsays { name, variant, choice });
         }

@@ -195,6 +195,21 @@ impl Entry {
     pub fn encode<'a>(&self, value: impl Into<Input<'a>>) -> Result<u16, ValueError> {
         self.quantity.encode(&self.name, &value.into())
     }
+
+    /// The bits of all its `words`, which stand in the order of their addresses.
+    pub fn raw(&self, words: &[u16]) -> u32 {
+        let behind = |high: u32, &low: &u16| high << 16 | u32::from(low);
+        if self.quantity.is_high_first() { words.iter().fold(0, behind) } else { words.iter().rev().fold(0, behind) }
+    }
+
+    /// The words for `value`, as many as the entry [has](Self::words), in the order of their addresses.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`encode`](Self::encode), but for two words.
+    pub fn encode_words<'a>(&self, value: impl Into<Input<'a>>) -> Result<Vec<u16>, ValueError> {
+        self.quantity.encode_words(&self.name, &value.into())
+    }
 }
 
 /// Why an entry cannot be used as asked. Nothing was sent.

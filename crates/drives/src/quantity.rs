@@ -126,8 +126,26 @@ impl Quantity {
         }
     }
 
-    /// The word for `input`; `name` is for the error.
+    /// The word for `input`, of a value that has one; `name` is for the error.
     pub(crate) fn encode(&self, name: &str, input: &Input<'_>) -> Result<u16, ValueError> {
+        if self.wide {
+            return Err(ValueError::TwoWords { name: name.to_owned() });
+        }
+        self.encode_count(name, input).map(to_word)
+    }
+
+    /// The words for `input`, in the order of their addresses; `name` is for the error.
+    pub(crate) fn encode_words(&self, name: &str, input: &Input<'_>) -> Result<Vec<u16>, ValueError> {
+        let count = self.encode_count(name, input)?;
+        Ok(match (self.wide, self.high_first) {
+            (false, _) => vec![to_word(count)],
+            (true, false) => vec![to_word(count), to_word(count >> 16)],
+            (true, true) => vec![to_word(count >> 16), to_word(count)],
+        })
+    }
+
+    /// The count for `input`, which the words hold.
+    fn encode_count(&self, name: &str, input: &Input<'_>) -> Result<i64, ValueError> {
         if let Some(variant) = self.variant.as_ref().filter(|_| self.is_undecided()) {
             return Err(ValueError::Undecided {
                 name: name.to_owned(),
@@ -135,21 +153,18 @@ impl Quantity {
                 variant: variant.clone(),
             });
         }
-        if self.wide {
-            return Err(ValueError::TwoWords { name: name.to_owned() });
-        }
         let counts = self.counts(name, input)?;
         let (low, high) = self.bounds();
         let within = |count: i64| low <= count && count <= high;
         match counts {
-            // A count within bounds fits the word: the loader checked the bounds.
-            Counts::Whole(count) if within(count) => Ok(to_word(count)),
+            // A count within bounds fits the words: the loader checked the bounds.
+            Counts::Whole(count) if within(count) => Ok(count),
             Counts::Above(floor) if within(floor) && within(floor + 1) => Err(ValueError::SurplusDigits {
                 name: name.to_owned(),
                 value: input.to_string(),
                 unit: self.unit().to_owned(),
-                below: self.decode(to_word(floor)),
-                above: self.decode(to_word(floor + 1)),
+                below: self.value(floor),
+                above: self.value(floor + 1),
             }),
             _ => Err(ValueError::OutOfRange {
                 name: name.to_owned(),
@@ -228,7 +243,7 @@ pub(crate) fn limits(signed: bool, wide: bool) -> (i64, i64) {
     }
 }
 
-/// The two's complement word of `count`, which must be within -32768..=65535.
+/// The low word of `count`, in two's complement.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low 16 bits are the word")]
 pub(crate) fn to_word(count: i64) -> u16 {
     count as u16

@@ -114,7 +114,7 @@ fn stored_told(py: Python<'_>, why: WhyNotStored<Failed>) -> PyResult<Told> {
 }
 
 /// The kind, and the word whose range is not printed.
-fn planned_told(why: WhyNotPlanned) -> PyResult<(&'static str, Option<u16>)> {
+fn planned_told(why: WhyNotPlanned) -> PyResult<(&'static str, Option<u32>)> {
     Ok(match why {
         WhyNotPlanned::Unknown(error) => return Err(refuse(error)),
         WhyNotPlanned::ReadOnly => ("read_only", None),

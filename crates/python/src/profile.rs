@@ -246,9 +246,9 @@ impl Profile {
     }
 
     #[pyo3(signature = (name, value, /))]
-    fn encode(&self, name: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<u16> {
+    fn encode(&self, name: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<u32> {
         let entry = self.find(name)?;
-        entry.encode(given(&entry, value)?.input()).map_err(refuse)
+        entry.encode_words(given(&entry, value)?.input()).map(|words| entry.raw(&words)).map_err(refuse)
     }
 
     #[pyo3(signature = (name, raw, /))]

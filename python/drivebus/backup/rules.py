@@ -70,6 +70,8 @@ class Rules:
 
     def unasked(self, code: str, *, serial: bool, motor: bool, raw: Collection[str] = ()) -> str | None:
         """Why *code* is not given back unless that is asked for; None if it is."""
+        if self.profile.describe(code).words > 1:
+            return "it has two words, which a restore does not write: write it by its name"
         if code not in raw and self.is_raw(code):
             return Text("what it means is not known: restored only by its name, with ", argument("raw", written="[…]"))
         if not serial and self.is_serial(code):

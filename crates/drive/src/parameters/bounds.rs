@@ -94,7 +94,7 @@ impl Unit {
             let is_within = if is_low { value >= bound.to_f64() } else { value <= bound.to_f64() };
             if !is_within {
                 let limit = Held::of(other, limit, bound);
-                return Err(Box::new(Beyond { wanted: item.held(item.word), limit, is_below: is_low }));
+                return Err(Box::new(Beyond { wanted: item.held(&item.words), limit, is_below: is_low }));
             }
         }
         Ok(())

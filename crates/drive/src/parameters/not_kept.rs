@@ -270,7 +270,7 @@ pub enum WhyNotPlanned {
     Unfit(ValueError),
     /// Nothing that is printed tells whether it takes this word.
     #[error("whether it takes {0} is not printed")]
-    NoRange(u16),
+    NoRange(u32),
     /// It cannot be written to where it was to be kept.
     #[error("{0}")]
     NoPlace(AccessError),

@@ -17,7 +17,8 @@ pub(crate) struct Planned<'p> {
     pub(super) entry: Cow<'p, Entry>,
     /// Where it goes, with the bit that says where it is kept.
     pub(super) place: Place,
-    pub(super) word: u16,
+    /// One, or two, in the order of their addresses.
+    pub(super) words: Vec<u16>,
 }
 
 impl Planned<'_> {
@@ -31,12 +32,17 @@ impl Planned<'_> {
     }
 
     pub(super) fn value(&self) -> Value {
-        self.entry.decode(self.word)
+        self.meant_by(&self.words)
     }
 
-    /// The same with `word` in its place.
-    pub(super) fn held(&self, word: u16) -> Held {
-        Held::of(self.name, &self.entry, self.entry.quantity().decode(word))
+    /// The same with `words` in its place.
+    pub(super) fn held(&self, words: &[u16]) -> Held {
+        Held::of(self.name, &self.entry, self.meant_by(words))
+    }
+
+    fn meant_by(&self, words: &[u16]) -> Value {
+        // There are as many as it has.
+        self.entry.quantity().decode_words(words).unwrap_or_else(|| self.entry.decode(0))
     }
 }
 
@@ -50,12 +56,12 @@ impl Unit {
     pub(crate) fn plan<'p>(&'p self, name: &'p str, value: Input<'_>, store: Store) -> Result<Planned<'p>, NotPlanned> {
         let entry = resolve(self.profile(), name)?;
         match self.planned(&entry, value, store) {
-            Ok((place, word)) => Ok(Planned { name, entry, place, word }),
+            Ok((place, words)) => Ok(Planned { name, entry, place, words }),
             Err(why) => Err(NotPlanned::of(name, why)),
         }
     }
 
-    fn planned(&self, entry: &Entry, value: Input<'_>, store: Store) -> Result<(Place, u16), Why> {
+    fn planned(&self, entry: &Entry, value: Input<'_>, store: Store) -> Result<(Place, Vec<u16>), Why> {
         let (profile, rule) = (self.profile(), self.rule());
         if entry.access() == Access::Ro {
             return Err(Why::ReadOnly);
@@ -70,10 +76,11 @@ impl Unit {
         if entry.kind() == Kind::Parameter && store == Store::Ram && profile.memory().is_none() {
             return Err(Why::OnlyStored);
         }
-        let word = entry.encode(value).map_err(Why::Unfit)?;
-        rule.word(entry, word.into()).map_err(|_| Why::NoRange(word))?;
+        let words = entry.encode_words(value).map_err(Why::Unfit)?;
+        let raw = entry.raw(&words);
+        rule.word(entry, raw).map_err(|_| Why::NoRange(raw))?;
         let place = profile.write_address(entry, store).map_err(Why::NoPlace)?;
         rule.kept(entry, store).map_err(|why| Why::MayNotKeep(why.to_string()))?;
-        Ok((place, word))
+        Ok((place, words))
     }
 }

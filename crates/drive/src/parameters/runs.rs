@@ -44,7 +44,10 @@ fn may_follow(profile: &Profile, run: &[Planned<'_>], item: &Planned<'_>) -> boo
 
 /// Whether `item` is a parameter that is simply kept, while the drive runs too.
 fn is_plain(profile: &Profile, item: &Planned<'_>) -> bool {
-    item.is_parameter() && item.entry.access() == Access::Run && profile.read_back(&item.entry).is_some()
+    item.is_parameter()
+        && item.words.len() == 1
+        && item.entry.access() == Access::Run
+        && profile.read_back(&item.entry).is_some()
 }
 
 /// Parameters that decide who commands the drive, or how the line is set.

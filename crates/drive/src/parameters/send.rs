@@ -32,15 +32,15 @@ impl Unit {
         // What stays in RAM until all is stored needs no more than to be there.
         let stays = self.profile().store_word().is_some();
         // What is read is what is in force. It tells about EEPROM only if RAM was not written since.
-        let words = self.words_of(line, run).await.map_err(Why::Failed)?;
+        let held = self.words_of(line, run).await.map_err(Why::Failed)?;
         let (mut from, mut is_told) = (0, true);
-        for (at, (item, word)) in run.iter().zip(words).enumerate() {
-            if word == item.word && (stays || !self.record().is_in_ram(item.key())) {
+        for (at, (item, words)) in run.iter().zip(held).enumerate() {
+            if words == item.words && (stays || !self.record().is_in_ram(item.key())) {
                 self.store(line, families, &run[from..at], is_told, done).await?;
                 done.push(item.name.to_owned());
                 (from, is_told) = (at + 1, true);
             } else {
-                is_told &= word != item.word;
+                is_told &= words != item.words;
             }
         }
         self.store(line, families, &run[from..], is_told, done).await
@@ -91,10 +91,8 @@ impl Unit {
     ) -> Result<(), Why<E>> {
         let Some(first) = run.first() else { return Ok(()) };
         let read_back = self.profile().read_back(&first.entry).filter(|_| is_told).map(|place| place.address);
-        let payload = match run {
-            [one] => Payload::Word(one.word),
-            several => Payload::Words(several.iter().map(|item| item.word).collect()),
-        };
+        let all: Vec<u16> = run.iter().flat_map(|item| &item.words).copied().collect();
+        let payload = if let [one] = all[..] { Payload::Word(one) } else { Payload::Words(all) };
         // A drive that says that it is busy may have begun to do what it was told.
         let acts = self.profile().acting().any(|entry| entry.name() == first.key());
         let words = Words { is_absolute: !acts, ..Words::value(first.place, payload, read_back) };
@@ -111,16 +109,19 @@ impl Unit {
 
     async fn in_force<E: LineError>(&self, line: &Mailbox<E>, run: &[Planned<'_>]) -> InForce<E> {
         match self.words_of(line, run).await {
-            Ok(words) => InForce::Shown(run.iter().zip(words).map(|(item, word)| item.held(word)).collect()),
+            Ok(words) => InForce::Shown(run.iter().zip(words).map(|(item, words)| item.held(&words)).collect()),
             Err(error) => InForce::Unread(error),
         }
     }
 
-    /// What the drive has of `run`, by one read.
-    async fn words_of<E>(&self, line: &Mailbox<E>, run: &[Planned<'_>]) -> Result<Vec<u16>, E> {
+    /// What the drive has of each of `run`, by one read.
+    async fn words_of<E>(&self, line: &Mailbox<E>, run: &[Planned<'_>]) -> Result<Vec<Vec<u16>>, E> {
         // What may be written has an address, and what shares a request fits into one.
         let first = run.first().and_then(|item| item.entry.place());
-        let Some((first, count)) = first.zip(u16::try_from(run.len()).ok()) else { return Ok(Vec::new()) };
-        line.taken_for(self.address(), self.family()).read(Read::words(self.address(), first, count)).await
+        let count: u16 = run.iter().map(|item| item.entry.words()).sum();
+        let Some(first) = first else { return Ok(Vec::new()) };
+        let read = Read::words(self.address(), first, count);
+        let mut words = line.taken_for(self.address(), self.family()).read(read).await?.into_iter();
+        Ok(run.iter().map(|item| words.by_ref().take(item.words.len()).collect()).collect())
     }
 }

@@ -14,12 +14,16 @@ use crate::parts::setpoint::Setpoint;
 use crate::place::{Place, Table};
 use crate::profile::Profile;
 
+/// The function that writes several words.
+const WRITE_MANY: u8 = 0x10;
+
 /// Checks the whole `profile`, which is put together.
 pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
     memory(file, manifest, profile, problems);
     words(file, profile, problems);
     setpoints(file, profile, problems);
     functions(file, manifest, profile, problems);
+    wide(file, manifest, profile, problems);
     protocol(file, manifest, profile, problems);
     sequence(file, profile, problems);
     if profile.fault_holds() && !(profile.state_tells_fault() && profile.role("fault").is_some()) {
@@ -126,6 +130,18 @@ fn protocol(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut 
             let has = "parameters at 0100H to 01FFH, read-only words at 0400H to 04FFH, and write-only ones at 0300H and 0500H";
             problems.add(file, place, format!("Huanyang's protocol has {has}: {} is none of those", entry.name));
         }
+    }
+}
+
+/// Two words are written by one request, so that the drive never has one half of a value.
+fn wide(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
+    if profile.functions().contains(&WRITE_MANY) && profile.requests().max_written > 1 {
+        return;
+    }
+    let at = manifest.requests.as_ref().map_or(1, |requests| line(file, &requests.max_words));
+    for entry in profile.entries.iter().filter(|entry| entry.words() == 2 && entry.access != Access::Ro) {
+        let reason = "it is written by 0x10 with two words, which \"functions\" or the most words do not allow";
+        problems.add(file, at, format!("{} has two words and can be written: {reason}", entry.name));
     }
 }
 

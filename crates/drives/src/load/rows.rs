@@ -226,8 +226,8 @@ fn entry(
     let access = Access::ALL.into_iter().find(|known| known.name() == access).ok_or_else(|| {
         row.broken(format!("access \"{access}\" must be {}", Access::ALL.map(Access::name).join(", ")))
     })?;
-    if quantity.wide && access != Access::Ro {
-        return Err(row.broken("a value of two words can only be read: its \"access\" must be ro"));
+    if quantity.wide && access != Access::Ro && kind == Kind::Register {
+        return Err(row.broken("a register of two words can only be read: its \"access\" must be ro"));
     }
     if quantity.wide && place.is_some_and(|place| place.address == u16::MAX) {
         return Err(row.broken("a value of two words does not fit at the last address"));

@@ -179,6 +179,45 @@ fn of_two_words_the_high_one_may_come_first() {
 }
 
 #[test]
+fn a_parameter_of_two_words_is_written_where_one_request_can() {
+    let row =
+        "3-42,0x0D5B,Ramp,s,100,no,2,high first,,,,,,run,,yes,,p. 2\n3-44,0x0D60,Step,,1,yes,2,,,,,,,run,,yes,,p. 2\n";
+    let load = |name: &str, toml: &str, parameters: &str, registers: &str| {
+        let folder = folder_of(name, toml, &format!("{ROWS}{registers}"));
+        folder.write("parameters.csv", format!("{PARAMETERS}{parameters}"));
+        folder.load().map_err(|why| why.to_string())
+    };
+    let writes = TOML.replace("[0x03, 0x06]", "[0x03, 0x06, 0x10]");
+    let profile = load("written", &writes, row, "").unwrap();
+    // 70000 hundredths are 0001 1170H; -2 is FFFF FFFEH, whose low word comes first.
+    let ramp = profile.find("3-42").unwrap();
+    assert_eq!(ramp.encode_words(Input::Decimal("700")), Ok(vec![0x0001, 0x1170]));
+    assert_eq!(ramp.raw(&[0x0001, 0x1170]), 70_000);
+    let step = profile.find("3-44").unwrap();
+    assert_eq!(step.encode_words(-2), Ok(vec![0xFFFE, 0xFFFF]));
+    assert_eq!(step.raw(&[0xFFFE, 0xFFFF]), 0xFFFF_FFFE);
+    assert!(ramp.encode_words(Input::Decimal("42949672.96")).is_err());
+    assert!(matches!(ramp.encode(1), Err(ValueError::TwoWords { .. })));
+
+    for (toml, registers, reason) in [
+        (TOML, "", "it is written by 0x10 with two words"),
+        (&*writes.replace("max_words = 8", "max_words = 1"), "", "it is written by 0x10 with two words"),
+        (
+            &*writes.replace("max_words = 8", "max_words = 8\nmax_written = 1"),
+            "",
+            "it is written by 0x10 with two words",
+        ),
+    ] {
+        let said = load("second", toml, row, registers).unwrap_err();
+        assert!(said.contains("3-42 has two words and can be written") && said.contains(reason), "{said}");
+    }
+    let other = "0x0D5C,other,Another,,1,no,,,,,,,rw,yes,,p. 1\n";
+    assert!(load("second", &writes, row, other).unwrap_err().contains("3-42 is at 0D5CH, where other is already"));
+    let said = load("register", &writes, "", "0x0030,wide,Wide,,1,no,2,,,,,,rw,yes,,p. 1\n").unwrap_err();
+    assert!(said.contains("a register of two words can only be read"), "{said}");
+}
+
+#[test]
 fn what_is_wrong_is_said() {
     let scale = "must be 1, 10, 100, 1000 or 10000, a ratio such as 16384/100, or empty if unknown";
     for (row, reason) in [

@@ -47,9 +47,10 @@ impl Map {
         for entry in profile.entries().filter(|entry| entry.kind() == Kind::Parameter) {
             let Some((address, low)) = entry.address().zip(low_word(entry)) else { continue };
             if entry.words() == 2 {
-                // A value of two words is only read, and its factory value fills no more than the low one.
+                // The factory value of two words fills no more than the low one.
                 let high = if low == address { address.wrapping_add(1) } else { address };
-                words.insert(high.into(), Word::Parameter(Parameter::shown(high)));
+                let access = access_of(entry);
+                words.insert(high.into(), Word::Parameter(Parameter { access, ..Parameter::shown(high) }));
             }
             words.insert(u32::from(low), Word::Parameter(parameter(&family, profile, entry, low)));
         }
@@ -114,20 +115,26 @@ impl Word {
     }
 }
 
+/// How a row of the profile is written.
+fn access_of(entry: &Entry) -> Access {
+    match entry.access() {
+        ProfileAccess::Ro => Access::ReadOnly,
+        ProfileAccess::Stop => Access::Stopped,
+        _ => Access::Always,
+    }
+}
+
 /// A row of the profile.
 fn parameter(family: &Family, profile: &Profile, entry: &Entry, address: u16) -> Parameter {
     let low = entry.quantity().low().map(Value::count);
     let lowest = low.and_then(|low| u16::try_from(low).ok()).unwrap_or(0);
     let assumed = || family.factory.iter().find(|&&(known, _)| known == address).map(|&(_, value)| value);
     let cap = family.roles.max_frequency.filter(|_| family.capped.contains(&address)).map(|max| max.address);
-    let bounds = bounds(profile, entry.quantity());
+    // Assumption: of two words any are in range.
+    let bounds = if entry.words() == 2 { Bounds::NONE } else { bounds(profile, entry.quantity()) };
     Parameter {
         address,
-        access: match entry.access() {
-            ProfileAccess::Ro => Access::ReadOnly,
-            ProfileAccess::Stop => Access::Stopped,
-            _ => Access::Always,
-        },
+        access: access_of(entry),
         bounds: Bounds { high_from: bounds.high_from.or(cap), ..bounds },
         factory: entry.default_raw().or_else(assumed).unwrap_or(lowest),
     }

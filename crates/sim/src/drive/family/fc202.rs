@@ -41,8 +41,8 @@ pub(crate) fn fc202() -> Family {
         parameters: vec![
             Parameter::shown(HIGHEST_REFERENCE - 1),
             Parameter { factory: 50_000, ..Parameter::shown(HIGHEST_REFERENCE) },
-            Parameter::shown(RAMP_DOWN - 1),
-            Parameter { factory: 1_000, ..Parameter::shown(RAMP_DOWN) },
+            Parameter { access: Access::Stopped, ..Parameter::shown(RAMP_DOWN - 1) },
+            Parameter { factory: 1_000, access: Access::Stopped, ..Parameter::shown(RAMP_DOWN) },
         ],
         factory: &[],
         capped: &[],
