@@ -11,11 +11,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TypeVar
 
-import drivebus
 from drivebus.cli import answer_values as values
 from drivebus.cli.dialogue import Dialogue
-from drivebus.cli.manual_cells import COUNTS, TableRow, UnclearAddresses
-from drivebus.cli.manual_table import ManualTable, NoAddresses
+from drivebus.cli.interview_tables import Pages, TableQuestions, content, one_of
+from drivebus.cli.manual_cells import TableRow
 from drivebus.cli.profile_answers import Answers, Commands, Ramp, Setting, Share, State, Watchdog
 from drivebus.cli.wrong_use import WrongUse
 
@@ -61,8 +60,8 @@ def ask(table: Path | None, source: str | None, count: str | None) -> Answers:
         manual = dialogue.needed("The manual: title or number, edition", values.plain)
         interview = _Interview(dialogue, manual)
         if table is not None and source is not None:
-            interview.take(table.read_bytes(), source, count)
-        interview.take_tables(count)
+            interview.tables.take(table.read_bytes(), source, count)
+        interview.tables.take_tables(count)
         answers = Answers(title, manual, interview.table)
         interview.fill(answers)
         return answers
@@ -75,73 +74,10 @@ class _Interview:
 
     def __init__(self, dialogue: Dialogue, manual: str) -> None:
         self._dialogue = dialogue
-        self.table = ManualTable()
-        self._manual = manual
-        self._page = ""
+        self._pages = Pages(dialogue, manual)
+        self.tables = TableQuestions(dialogue, self._pages)
+        self.table = self.tables.table
         self._used: list[TableRow] = []
-
-    def take_tables(self, count: str | None) -> None:
-        """Tables of the manual, until there are no more."""
-        self._dialogue.say(
-            "Tables of registers or parameters spare you typing: CSV, or text as pasted, its line of titles first."
-        )
-        question = "File with a table (- to paste one; Enter: no more)"
-        while (found := self._dialogue.optional(question, self._content)) is not None:
-            try:
-                self.take(found.encode(), self._source(), count)
-            except (drivebus.NotAllowed, WrongUse) as error:
-                self._dialogue.say(f"Error: {error}")
-
-    def take(self, data: bytes, source: str, count: str | None) -> None:
-        """Adds a table, and says what was left out of it."""
-        rows = self._read(data, source, count)
-        for line, why in sorted(self.table.left_out):
-            self._dialogue.say(f"line {line} is left out: {why}")
-        if self.table.unused:
-            self._dialogue.say(f"Nothing is taken from the columns {', '.join(map(repr, self.table.unused))}.")
-        self._take_decimals(rows)
-        for row in rows:
-            if row.notes:
-                self._dialogue.say(f"line {row.line}, {row.code or row.name}, goes into a note: {'; '.join(row.notes)}")
-        for kind, found in (("Registers", [row for row in rows if not row.code]), ("Parameters", [*_coded(rows)])):
-            if found:
-                self._dialogue.say(
-                    f"{kind}: {', '.join(f'{row.code or row.name} at {row.address:04X}H' for row in found)}."
-                )
-
-    def _read(self, data: bytes, source: str, count: str | None) -> list[TableRow]:
-        """The rows of a table, whose addresses may have to be asked for."""
-        try:
-            return self.table.read(data, source, count=count)
-        except UnclearAddresses:
-            count = self._dialogue.needed("Its addresses are hex, decimal or 40001", _of(COUNTS[:3]))
-        except NoAddresses:
-            if not self._dialogue.agreed(
-                "Does the code of a parameter tell its address, P05.06 at 0506H?", default=False
-            ):
-                raise
-            count = "group.index"
-        return self.table.read(data, source, count=count)
-
-    def _take_decimals(self, rows: list[TableRow]) -> None:
-        """The steps of ranges that are printed without one, if their decimals tell."""
-        printed = [row for row in rows if row.printed is not None]
-        if not printed:
-            return
-        low, high, unit, _ = printed[0].printed or ("", "", "", "")
-        first = f"{printed[0].code or printed[0].name}: {low} to {high} {unit}".rstrip()
-        if self._dialogue.agreed(f"Is one count the last decimal that a range has ({first})?", default=False):
-            for row in printed:
-                row.by_decimals()
-
-    def _content(self, text: str) -> str:
-        """What is in a file, or is pasted."""
-        if text == "-":
-            return self._dialogue.pasted()
-        try:
-            return Path(text).read_bytes().decode("utf-8-sig", "replace")
-        except OSError as error:
-            raise WrongUse(f"{text}: {error.strerror or error}") from error
 
     def fill(self, answers: Answers) -> None:
         """Asks for all that makes the drive known by name."""
@@ -166,23 +102,26 @@ class _Interview:
         self._take_access()
         if answers.fault is not None:
             question = "File with the numbers of the faults, 1 OC overcurrent (- to paste; Enter: none)"
-            answers.faults = self._dialogue.optional(question, lambda text: values.faults(self._content(text))) or []
-            answers.faults_source = self._source() if answers.faults else ""
+            answers.faults = self._dialogue.optional(question, self._faults) or []
+            answers.faults_source = self._pages.source() if answers.faults else ""
         answers.writes = self._dialogue.needed("Functions that write words: 6, 16, or both", values.functions, "6")
         most = "Most words in one request; 1 is never wrong"
         answers.max_words = self._dialogue.needed(most, _most_words, "1")
-        answers.requests_source = self._source() if answers.max_words > 1 or answers.writes != [6] else ""
+        answers.requests_source = self._pages.source() if answers.max_words > 1 or answers.writes != [6] else ""
         factory = "The line as it leaves the factory: speed, format, unit, such as 9600 8N1 1"
         line = self._dialogue.optional(factory, values.line)
         if line is not None:
-            answers.serial = (*line, self._source())
+            answers.serial = (*line, self._pages.source())
+
+    def _faults(self, text: str) -> list[tuple[int, str, str]]:
+        return values.faults(content(self._dialogue, text))
 
     def _commands(self) -> Commands | None:
         register = self._register("Register that takes run and stop", "Command to the motor", "wo", set())
         if register is None:
             return None
         _allow(register, "wo")
-        source = self._source_of(register)
+        source = self._pages.source_of(register)
         words: dict[str, int] = {}
         elsewhere: dict[str, tuple[TableRow, int]] = {}
         for command, question in _COMMANDS.items():
@@ -209,9 +148,9 @@ class _Interview:
         register = self._register("Register that tells what the motor does", "What the motor does", "ro", set())
         if register is None:
             return None
-        source = self._source_of(register)
+        source = self._pages.source_of(register)
         register.scale = 1
-        how = self._dialogue.needed("It tells by one number for each state, or by bits", _of(("number", "bits")))
+        how = self._dialogue.needed("It tells by one number for each state, or by bits", one_of(("number", "bits")))
         if how == "number":
             numbers = self._each_state(_STATES, "Number", values.word)
             return State(register, numbers, {}, source) if numbers else None
@@ -245,7 +184,7 @@ class _Interview:
         if row.low or row.high:
             row.without_range()
         row.unit, row.variant = "", "of_speed"
-        return Share(code.code, counts, low, high, self._source())
+        return Share(code.code, counts, low, high, self._pages.source())
 
     def _is_in_hertz(self, row: TableRow) -> bool:
         if row.unit != "Hz" or row.scale is None:
@@ -368,7 +307,7 @@ class _Interview:
         found = self._dialogue.optional(question, values.place)
         if found is None or found[0] != "holding":
             raise WrongUse(f"{code} needs the address of a holding register")
-        row = self._at(found[1]) or self.table.add(found[1], code, self._source())
+        row = self._at(found[1]) or self.table.add(found[1], code, self._pages.source())
         row.code = row.code or code
         return row
 
@@ -377,7 +316,7 @@ class _Interview:
         question = f"{question}: name or address, such as 2000H"
         found = self._dialogue.optional(question, lambda text: self._free(text, units))
         if isinstance(found, int):
-            found = self.table.add(found, label, self._source())
+            found = self.table.add(found, label, self._pages.source())
         if found is not None:
             self._used.append(found)
         if found is not None and found.access == "unknown":
@@ -412,35 +351,10 @@ class _Interview:
         if address == register.address:
             return register, values.new(words, values.command_word)(said)
         word = values.command_word(said)
-        row = self._at(address) or self.table.add(address, "Fault reset", self._source())
+        row = self._at(address) or self.table.add(address, "Fault reset", self._pages.source())
         _allow(row, "wo")
         _widen(row, [word])
         return row, word
-
-    def _source_of(self, row: TableRow) -> str:
-        """Where the words of a register are printed; one that no table has was just asked for its page."""
-        if not row.line:
-            return row.source
-        if row.source.startswith(f"{self._manual}, "):
-            self._page = row.source.removeprefix(f"{self._manual}, ").removeprefix("p. ")
-        return self._source("Page that says what its words mean")
-
-    def _source(self, question: str = "Its page") -> str:
-        """Document and page; the page before is offered."""
-        self._page = self._dialogue.needed(question, values.plain, self._page or None)
-        return f"{self._manual}, {f'p. {self._page}' if self._page.isdecimal() else self._page}"
-
-
-def _of(choices: Iterable[str]) -> Callable[[str], str]:
-    """What takes one of *choices*."""
-    known = list(choices)
-
-    def read(text: str) -> str:
-        if text.strip() not in known:
-            raise WrongUse(f'"{text.strip()}" is not one of {", ".join(known)}')
-        return text.strip()
-
-    return read
 
 
 def _most_words(text: str) -> int:
@@ -448,10 +362,6 @@ def _most_words(text: str) -> int:
     if not 1 <= count <= 125:
         raise WrongUse(f"{count} is not in the range from 1 to 125")
     return count
-
-
-def _coded(rows: Iterable[TableRow]) -> Iterator[TableRow]:
-    return (row for row in rows if row.code)
 
 
 def _allow(row: TableRow, access: str) -> None:

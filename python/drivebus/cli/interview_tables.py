@@ -1,0 +1,127 @@
+"""The tables of a manual, one after the other: what is taken of each, and what is asked where it means two things."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import drivebus
+from drivebus.cli import answer_values as values
+from drivebus.cli.dialogue import Dialogue
+from drivebus.cli.manual_cells import COUNTS, TableRow, UnclearAddresses
+from drivebus.cli.manual_table import ManualTable, NoAddresses
+from drivebus.cli.wrong_use import WrongUse
+
+__all__ = ["Pages", "TableQuestions", "content", "one_of"]
+
+
+class Pages:
+    """Where a manual prints what is answered; the page before is offered."""
+
+    def __init__(self, dialogue: Dialogue, manual: str) -> None:
+        self._dialogue = dialogue
+        self._manual = manual
+        self._page = ""
+
+    def source_of(self, row: TableRow) -> str:
+        """Where the words of a register are printed; one that no table has was just asked for its page."""
+        if not row.line:
+            return row.source
+        if row.source.startswith(f"{self._manual}, "):
+            self._page = row.source.removeprefix(f"{self._manual}, ").removeprefix("p. ")
+        return self.source("Page that says what its words mean")
+
+    def source(self, question: str = "Its page") -> str:
+        """Document and page; the page before is offered."""
+        self._page = self._dialogue.needed(question, values.plain, self._page or None)
+        return f"{self._manual}, {f'p. {self._page}' if self._page.isdecimal() else self._page}"
+
+
+class TableQuestions:
+    """The tables that are given.
+
+    Attributes:
+        table: The rows of all of them.
+    """
+
+    def __init__(self, dialogue: Dialogue, pages: Pages) -> None:
+        self.table = ManualTable()
+        self._dialogue = dialogue
+        self._pages = pages
+
+    def take_tables(self, count: str | None) -> None:
+        """Tables of the manual, until there are no more."""
+        self._dialogue.say(
+            "Tables of registers or parameters spare you typing: CSV, or text as pasted, its line of titles first."
+        )
+        question = "File with a table (- to paste one; Enter: no more)"
+        while (found := self._dialogue.optional(question, lambda text: content(self._dialogue, text))) is not None:
+            try:
+                self.take(found.encode(), self._pages.source(), count)
+            except (drivebus.NotAllowed, WrongUse) as error:
+                self._dialogue.say(f"Error: {error}")
+
+    def take(self, data: bytes, source: str, count: str | None) -> None:
+        """Adds a table, and says what was left out of it."""
+        rows = self._read(data, source, count)
+        for line, why in sorted(self.table.left_out):
+            self._dialogue.say(f"line {line} is left out: {why}")
+        if self.table.unused:
+            self._dialogue.say(f"Nothing is taken from the columns {', '.join(map(repr, self.table.unused))}.")
+        self._take_decimals(rows)
+        for row in rows:
+            if row.notes:
+                self._dialogue.say(f"line {row.line}, {row.code or row.name}, goes into a note: {'; '.join(row.notes)}")
+        registers, parameters = [row for row in rows if not row.code], [row for row in rows if row.code]
+        for kind, found in (("Registers", registers), ("Parameters", parameters)):
+            if found:
+                self._dialogue.say(
+                    f"{kind}: {', '.join(f'{row.code or row.name} at {row.address:04X}H' for row in found)}."
+                )
+
+    def _read(self, data: bytes, source: str, count: str | None) -> list[TableRow]:
+        """The rows of a table, whose addresses may have to be asked for."""
+        try:
+            return self.table.read(data, source, count=count)
+        except UnclearAddresses:
+            count = self._dialogue.needed("Its addresses are hex, decimal or 40001", one_of(COUNTS[:3]))
+        except NoAddresses:
+            if not self._dialogue.agreed(
+                "Does the code of a parameter tell its address, P05.06 at 0506H?", default=False
+            ):
+                raise
+            count = "group.index"
+        return self.table.read(data, source, count=count)
+
+    def _take_decimals(self, rows: list[TableRow]) -> None:
+        """The steps of ranges that are printed without one, if their decimals tell."""
+        printed = [row for row in rows if row.printed is not None]
+        if not printed:
+            return
+        low, high, unit, _ = printed[0].printed or ("", "", "", "")
+        first = f"{printed[0].code or printed[0].name}: {low} to {high} {unit}".rstrip()
+        if self._dialogue.agreed(f"Is one count the last decimal that a range has ({first})?", default=False):
+            for row in printed:
+                row.by_decimals()
+
+
+def content(dialogue: Dialogue, text: str) -> str:
+    """What is in a file, or is pasted."""
+    if text == "-":
+        return dialogue.pasted()
+    try:
+        return Path(text).read_bytes().decode("utf-8-sig", "replace")
+    except OSError as error:
+        raise WrongUse(f"{text}: {error.strerror or error}") from error
+
+
+def one_of(choices: Iterable[str]) -> Callable[[str], str]:
+    """What takes one of *choices*."""
+    known = list(choices)
+
+    def read(text: str) -> str:
+        if text.strip() not in known:
+            raise WrongUse(f'"{text.strip()}" is not one of {", ".join(known)}')
+        return text.strip()
+
+    return read
