@@ -362,9 +362,8 @@ class TestDelta:
         assert (found.family, found.certainty) == ("ms300", "by answers")
         asked = [data[2:4].hex() for _, who, data in line.line.trace() if who == "master" and data[1] == 0x03]
         assert list(dict.fromkeys(asked)) == [
-            *("2103", "1900", "2104", "2106", "200b", "3000", "091b"),
+            *("2103", "1900", "2104", "2106", "200b", "3000", "091b", "2108"),
             *(
-                "2108",
                 "7000",
                 "004b",
                 "0020",

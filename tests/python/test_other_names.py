@@ -67,6 +67,13 @@ UNITS = {
         ],
         stop=1,
     ),
+    # The first takes its commands, and counts another setpoint.
+    "vfd-b": Unit(
+        [(0x0201, 3), (0x0200, 5)],
+        0x2000,
+        ["yl620", "gs2", "gd350", "md500", "vfd500", "e510", "eds300", "a1000", "acs355"],
+        stop=1,
+    ),
 }
 PAIRS = [(unit, other) for unit, known in UNITS.items() for other in known.others]
 

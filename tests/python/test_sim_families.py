@@ -60,6 +60,7 @@ FAMILIES = {
     44: "atv320",
     45: "gs4",
     46: "cfw500",
+    47: "vfd-b",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]
@@ -143,7 +144,7 @@ def test_identification_is_the_family_s_own_or_refused(bus: Bus) -> None:
     for family in MODBUS:
         if family in codes:
             assert read(bus, family, 0x2103) == [codes[family]]
-        elif family in ("ms300", "vfd-e", "gs2", "gs4"):  # its output frequency: manuals, pp. 799 and 4-126
+        elif family in ("ms300", "vfd-e", "vfd-b", "gs2", "gs4"):  # its output frequency: manuals, pp. 799 and 4-126
             assert read(bus, family, 0x2103) == [0]
         elif family == "atv320":  # it refuses no read
             assert read(bus, family, 0x2103) == [0x8000]
@@ -276,6 +277,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "gs2",
             "gs4",
             "cfw500",
+            "vfd-b",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:

@@ -17,8 +17,8 @@ QUESTIONS = {
     **dict.fromkeys(("gd600", "gd3000"), (4, 75)),
     **dict.fromkeys(("eds300", "sunfar-e300", "fc202"), (5, 90)),
     # One of these is also asked for 200BH, which a YL620 has: it would turn at ten times the speed.
-    # And for 091BH, by which a GS2 runs.
-    **dict.fromkeys(("ms300", "vfd-e"), (7, 125)),
+    # And for 091BH, by which a GS2 runs, and for 2108H or 2105H: a VFD-B has both.
+    **dict.fromkeys(("ms300", "vfd-e", "vfd-b"), (8, 142)),
     # And this one for 3F5BH, which an FC 202 has.
     "fc51": (6, 108),
     "yl620": (4, 75),

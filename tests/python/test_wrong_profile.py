@@ -106,6 +106,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     # And this one 2104H and 2106H, this one 2108H and 2109H, and this one 200BH and 2012H.
     "ms300": ["ms300"],
     "vfd-e": ["vfd-e"],
+    # And this one 2105H and 2108H.
+    "vfd-b": ["vfd-b"],
     "yl620": ["yl620"],
     # And this one 7000H and 3000H.
     "md500": ["md500"],
@@ -170,7 +172,7 @@ SAYS = {
     "gd200a": "0107H",
 }
 
-ASKED_FOR_NO_CODE = ["gs2", "gs4", "ms300", "vfd-e", "yl620"]
+ASKED_FOR_NO_CODE = ["gs2", "gs4", "ms300", "vfd-b", "vfd-e", "yl620"]
 """Families that have something else where others have a code: what stands there is not asked for, since it is none.
 A YL620 is told by what it answers alone."""
 

@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 46] = [
+static BUILTINS: [Builtin; 47] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -161,6 +161,7 @@ static BUILTINS: [Builtin; 46] = [
     builtin!("chv100": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("ms300": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("vfd-e": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("vfd-b": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("yl620": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("md500": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("a1000": "registers.csv" "parameters.csv" "faults.csv"),

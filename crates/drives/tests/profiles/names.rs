@@ -131,6 +131,8 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("AutomationDirect GS2", "gs2"),
         ("gs3", "gs2"),
         ("GS4", "gs4"),
+        ("VFD-B", "vfd-b"),
+        ("Delta VFD-B", "vfd-b"),
         ("DURApulse GS4", "gs4"),
         ("AutomationDirect GS4", "gs4"),
         ("Teco-Westinghouse E510", "e510"),

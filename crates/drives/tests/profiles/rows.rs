@@ -215,6 +215,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("h100", 173),
         ("gs2", 43),
         ("gs4", 54),
+        ("vfd-b", 32),
         ("j1000", 17),
         ("cfw500", 29),
         ("chv100", 24),

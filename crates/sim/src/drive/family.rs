@@ -49,6 +49,7 @@ mod unlisted;
 mod v20;
 mod vf_s15;
 mod vfd500;
+mod vfd_b;
 mod vfd_e;
 mod wj200;
 mod yl620;
@@ -162,7 +163,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 46] = [
+const FAMILIES: [fn() -> Family; 47] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -180,6 +181,7 @@ const FAMILIES: [fn() -> Family; 46] = [
     chf100a::chv100,
     ms300::ms300,
     vfd_e::vfd_e,
+    vfd_b::vfd_b,
     yl620::yl620,
     md500::md500,
     a1000::a1000,
