@@ -77,7 +77,7 @@ def test_what_asks_of_a_unit_that_nobody_knows_stays_small() -> None:
             *("2103", "1900", "2104", "2108", "200b", "7000", "004b", "0020", "02a8", "2180", "d000", "045c", "0c81"),
             "006d",
             *("0003", "0000"),  # P00.03 is there, and no P00.00
-            *("c417", "080e", "fd00", "2520", "091b", "1003", "008b"),
+            *("c417", "080e", "fd00", "2520", "091b", "083e", "1003", "008b"),
         ]
         assert len(asked) == 24
         # And input register 0000H, once for all: an H100 answers it, an A1000 and a V20 refuse it.

@@ -74,6 +74,28 @@ UNITS = {
         ["yl620", "gs2", "gd350", "md500", "vfd500", "e510", "eds300", "a1000", "acs355"],
         stop=1,
     ),
+    # The first two have parameters where it is commanded; the others are commanded or set where it has something else.
+    "vacon10": Unit(
+        [(0x007C, 3), (0x0074, 2)],
+        0x07D0,
+        [
+            "acs355",
+            "acs580",
+            "v20",
+            "optidrive-e3",
+            "fr-d700",
+            "a1000",
+            "j1000",
+            "h100",
+            "fc51",
+            "fc202",
+            "frenic",
+            "gd350",
+            "md500",
+            "vfd500",
+            "atv312",
+        ],
+    ),
 }
 PAIRS = [(unit, other) for unit, known in UNITS.items() for other in known.others]
 

@@ -29,10 +29,11 @@ VARIANTS = {
     "fc202": {"base_frequency": "50 Hz"},
     "v20": {"base_frequency": "50 Hz"},
     "md500": {"max_frequency": "50 Hz"},
+    "vacon10": {"max_frequency": "50 Hz"},
     "acs355": {"base_frequency": "50 Hz"},
     "acs580": {"base_frequency": "50 Hz"},
 }
-"""As they come from the factory: P30.14 is 1, o1-03 is 0; 3-03, P2000, F0-10, 1105 and 46.02 are 50 Hz."""
+"""As they come from the factory: P30.14 is 1, o1-03 is 0; 3-03, P2000, F0-10, P3.2, 1105 and 46.02 are 50 Hz."""
 
 READ_ONLY = {
     "vfd500": 0x04,
@@ -46,6 +47,7 @@ READ_ONLY = {
             "vfd-b",
             "optidrive-e3",
             "sj200",
+            "vacon10",
         ],
         0x02,
     ),
@@ -77,6 +79,7 @@ OUT_OF_RANGE = {
             "gs4",
             "cfw500",
             "vfd-b",
+            "vacon10",
         ],
         0x03,
     ),

@@ -61,6 +61,7 @@ FAMILIES = {
     45: "gs4",
     46: "cfw500",
     47: "vfd-b",
+    48: "vacon10",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]
@@ -278,12 +279,14 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "gs4",
             "cfw500",
             "vfd-b",
+            "vacon10",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:
             assert bus.transact(UNIT[family], pdu(0x08, 0, 0x12AB)) == pdu(0x08, 0, 0x12AB)
-        # An H100 has 04H, and nothing there.
-        assert refusal(bus, family, pdu(0x04, 0x2100, 1)) == (0x02 if family == "h100" else unknown), family
+        # An H100 and a Vacon 10 have 04H, and nothing there.
+        nothing = 0x02 if family in ("h100", "vacon10") else unknown
+        assert refusal(bus, family, pdu(0x04, 0x2100, 1)) == nothing, family
     write_many = bytes.fromhex("10 2000 0001 02 0005")
     for family in ("gd3000", "gd3000-rectifier", "chf100a", "chv100"):
         assert refusal(bus, family, write_many) == 0x01, family

@@ -43,9 +43,12 @@ QUESTIONS = {
     "sj200": (7, 125),
     # It is commanded where Goodrives and others have parameters, some of them without a code.
     "optidrive-e3": (8, 140),
+    # An ACS355 and others have parameters where this one is commanded.
+    "vacon10": (9, 155),
     # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there; and for 02A8H,
     # which a CFW500 has.
-    "acs355": (12, 203),
+    # And for 2649H, its 9802, which a Vacon 10 has not.
+    "acs355": (13, 221),
     "acs580": (9, 155),
     # Nothing is asked: what halts it says nothing to a drive of Modbus. The line is silent for 50 ms before.
     "huanyang-hy": (0, 55),

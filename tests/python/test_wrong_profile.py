@@ -47,6 +47,7 @@ SILENT_ON_CODES = [
     "eds300",
     "sunfar-e300",
     "fc51",
+    "vacon10",
     "fc202",
     "atv312",
     "atv12",
@@ -77,6 +78,7 @@ SIGNED = [
     "optidrive-e3",
     "sj200",
     "cfw500",
+    "vacon10",
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -130,6 +132,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     # And this one 091BH and 2104H, and that one 091BH and 091FH.
     "gs2": ["gs2"],
     "gs4": ["gs4"],
+    # And this one 083EH and 0834H, its fault and its state.
+    "vacon10": ["vacon10"],
     "eds300": ["eds300"],
     "sunfar-e300": ["sunfar-e300"],
     # And these rFr and CMD: 0C82H and 2135H; this one Otr, 0C85H, and that one HMIS, 0CA8H.
@@ -143,7 +147,7 @@ TAKEN_FOR: dict[str, list[str]] = {
     "atv320": ["atv320"],
     # And this one STW, ZSW and the output frequency: 0063H, 006DH and 0017H.
     "v20": ["v20"],
-    # And this one the three words of the ABB drives profile, 0000H, 0003H and 0066H.
+    # And this one the three words of the ABB drives profile, 0000H, 0003H and 0066H, and 9802: 2649H.
     "acs355": ["acs355"],
     # And this one, beside the first two of them, 58.01: 16A8H.
     "acs580": ["acs580"],

@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 47] = [
+static BUILTINS: [Builtin; 48] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -186,6 +186,7 @@ static BUILTINS: [Builtin; 47] = [
     builtin!("e510": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gs2": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gs4": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("vacon10": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("wj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("sj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("h100": "registers.csv" "parameters.csv" "faults.csv"),

@@ -135,6 +135,8 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("Delta VFD-B", "vfd-b"),
         ("DURApulse GS4", "gs4"),
         ("AutomationDirect GS4", "gs4"),
+        ("VACON 10", "vacon10"),
+        ("m-max", "vacon10"),
         ("Teco-Westinghouse E510", "e510"),
         ("FR-D740", "fr-d700"),
         ("fr e740", "fr-d700"),

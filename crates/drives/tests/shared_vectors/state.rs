@@ -107,7 +107,8 @@ fn of_the_shipped_profiles_only_six_words_say_two_things() {
                         "vf-s15",
                         "optidrive-e3",
                         "e510",
-                        "cfw500"
+                        "cfw500",
+                        "vacon10"
                     ]
                     .contains(&name),
                 "{name}: {raw:04X}H is {said:?}"

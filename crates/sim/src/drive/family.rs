@@ -47,6 +47,7 @@ mod sj200;
 mod sunfar;
 mod unlisted;
 mod v20;
+mod vacon;
 mod vf_s15;
 mod vfd500;
 mod vfd_b;
@@ -163,7 +164,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 47] = [
+const FAMILIES: [fn() -> Family; 48] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -208,6 +209,7 @@ const FAMILIES: [fn() -> Family; 47] = [
     e510::e510,
     gs2::gs2,
     gs4::gs4,
+    vacon::vacon10,
     h100::h100,
     optidrive::e3,
     huanyang::huanyang,
