@@ -46,12 +46,11 @@ READ_ONLY = {
             "gs4",
             "vfd-b",
             "optidrive-e3",
-            "sj200",
             "vacon10",
         ],
         0x02,
     ),
-    **dict.fromkeys(["a1000", "j1000"], 0x22),
+    **dict.fromkeys(["a1000", "j1000", "sj200"], 0x22),
     "e510": 0x05,
     "cfw500": 0x03,
     # Its manual (1755863, p. 39) refuses a write of ETA so.
@@ -74,7 +73,6 @@ OUT_OF_RANGE = {
             "vf-s15",
             "frenic",
             "optidrive-e3",
-            "sj200",
             "gs2",
             "gs4",
             "cfw500",
@@ -83,7 +81,7 @@ OUT_OF_RANGE = {
         ],
         0x03,
     ),
-    **dict.fromkeys(["a1000", "j1000"], 0x21),
+    **dict.fromkeys(["a1000", "j1000", "sj200"], 0x21),
 }
 """And a value that is out of range, where it is not their 04H."""
 

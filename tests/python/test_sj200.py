@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import drivebus
-from drivebus import Bus, Drive, DrivebusError, Simulator, State
+from drivebus import Bus, Drive, DrivebusError, Profile, Simulator, State
 
 from .jobs import carry_out_awaited
 from .on_the_wire import written
@@ -107,6 +107,44 @@ def test_a_coil_that_was_never_written_is_reverse(line: Simulator) -> None:
         bus.transact(1, bytes.fromhex("05 0001 FF00"))
     line.advance(1.0)
     assert line.drive(1).state == "reverse"
+
+
+@pytest.mark.parametrize(
+    ("request_", "exception"),
+    [
+        ("04 00 01 00 01", 0x01),
+        ("05 00 00 FF 00", 0x02),
+        ("06 00 01 0F A1", 0x21),
+        ("06 00 0A 00 01", 0x22),
+    ],
+)
+def test_it_refuses_as_the_manual_of_its_sister_says(line: Simulator, request_: str, exception: int) -> None:
+    """L200 manual (manualsonline l200), p. 233 (B-17)."""
+    asked = bytes.fromhex(request_)
+    with Bus(line) as bus, pytest.raises(drivebus.Refused) as refused:
+        bus.transact(1, asked)
+    assert refused.value.code == exception
+
+
+def test_the_last_trips_are_three_words(line: Simulator) -> None:
+    """P. B-11 (easymanua.ls sj200-series, p. 225): 05 03 00 19 00 03 reads them, and 00FFH is no trip."""
+    with Bus(line) as bus:
+        assert bus.read(1, 0x0019, 3) == [255, 255, 255]
+    profile = Profile.builtin("sj200")
+    assert [profile.fields("trip_1", word) for word in (7, 9, 255)] == [
+        {"cause": "E07, overvoltage"},
+        {"cause": "E09, undervoltage"},
+        {"cause": "no trip"},
+    ]
+
+
+def test_nothing_but_a_write_by_its_address_trips_it(line: Simulator, drive: Drive) -> None:
+    """P. B-19: coil 0003H, 1 is an external trip. It lets a turning motor go."""
+    drive.run(10.0)
+    line.advance(30.0)
+    with pytest.raises(drivebus.NotAllowed):
+        drive.write("external_trip", 1)
+    assert line.drive(1).frequency == 10.0
 
 
 def test_two_that_are_alike_are_known_by_their_answers() -> None:

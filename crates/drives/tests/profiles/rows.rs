@@ -243,7 +243,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("ms300", 23),
         ("optidrive-e3", 17),
         ("saj8000m", 14),
-        ("sj200", 20),
+        ("sj200", 23),
         ("sunfar-e300", 6),
         ("v20", 19),
         ("vf-s15", 9),

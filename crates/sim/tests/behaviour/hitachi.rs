@@ -45,7 +45,9 @@ fn the_numbers_of_its_manual_are_the_addresses() {
     // Coil 0000h is reserved, and no register is at 1003H, where a WJ200 has d003.
     assert_eq!(bench.ask(1, &hex("05 00 00 FF 00")), Some(hex("85 02")));
     bench.refuses_read(0x1003, 1, 0x02);
-    bench.refuses_write(0x0001, 4_001, 0x03);
+    // 21H and 22H: L200 manual (manualsonline l200), p. 233 (B-17).
+    bench.refuses_write(0x0001, 4_001, 0x21);
+    bench.refuses_write(0x000A, 1, 0x22);
 }
 
 #[test]

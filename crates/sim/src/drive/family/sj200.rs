@@ -3,10 +3,11 @@
 //! Coils 0001h run, 0002h direction, 0004h reset, 000Eh running, 000Fh reverse, 0010h ready: SJ200 manual (manualslib 68018), p. 233;
 //! 0014h alarm and those behind it: (manualsdir 88658), p. 234. Register 0001h, 0.1 Hz, and 0002h: L200 manual (manualsonline l200), p. 237.
 //! 000Ah to 0019h: SJ200 manual (azmanual 88658), p. 236. 003Ah, A020: (manualsdump 112379), p. 227. That the numbers are the addresses: the
-//! frames of manualsonline sj200_series, p. 226, and of that page.
+//! frames of manualsonline sj200_series, p. 226, and of that page. Exceptions: L200 manual (manualsonline l200), p. 233 (B-17).
+//! 0019h to 001Bh: SJ200 manual (easymanua.ls sj200-series), p. 225 (B-11).
 //!
 //! - Assumption: A001 and A002 are set so that the bus is obeyed. They are not simulated, nor are other parameters than A020.
-//! - Assumption: exceptions are those of the Modbus specification. What is not here is refused with 02H.
+//! - Assumption: 0003h = 1 lets the motor coast and trips nothing; no trip is kept at 0019h.
 //! - Assumption: 100 % of the current are 10 A, and of the voltage 400 V. Coils 0007h to 000Ch do nothing, and are not here.
 //! - Assumption: the direction of a motor that runs is changed at once, and a reset is carried out by each 1.
 
@@ -19,10 +20,11 @@ use super::{
 use crate::drive::machine::{Command, Direction};
 use crate::drive::map::Access;
 use crate::drive::places::spot;
-use crate::drive::refusal::by_the_specification;
+use crate::drive::refusal::Refusal;
 
 const RUN: u32 = spot(Table::Coil, 0x0001);
 const DIRECTION: u32 = spot(Table::Coil, 0x0002);
+const EXTERNAL_TRIP: u32 = spot(Table::Coil, 0x0003);
 const RESET: u32 = spot(Table::Coil, 0x0004);
 const FREQUENCY: u32 = 0x0001;
 const MULTI_SPEED: u16 = 0x003A;
@@ -35,12 +37,17 @@ pub(crate) fn sj200() -> Family {
         functions: vec![0x01, 0x03, 0x05, 0x06, 0x08, 0x10],
         max_words: 4,
         across_groups: true,
-        exception: by_the_specification,
+        exception,
         memory: Memory::EepromOnly,
         identification: 0,
         command: Some(RUN),
         commands: vec![(0, Command::Stop), (1, Command::Run(Direction::Forward))],
-        elsewhere: vec![(RESET, 0, Command::Nothing), (RESET, 1, Command::ResetFault)],
+        elsewhere: vec![
+            (EXTERNAL_TRIP, 0, Command::Nothing),
+            (EXTERNAL_TRIP, 1, Command::Coast),
+            (RESET, 0, Command::Nothing),
+            (RESET, 1, Command::ResetFault),
+        ],
         registers: registers(),
         parameters: vec![Parameter::new(MULTI_SPEED, 0, 4_000, 0)],
         factory: &[],
@@ -58,13 +65,26 @@ pub(crate) fn sj200() -> Family {
     }
 }
 
+/// L200 manual, p. B-17.
+fn exception(refusal: Refusal) -> u8 {
+    match refusal {
+        Refusal::Function => 0x01,
+        Refusal::Address | Refusal::Unreadable => 0x02,
+        Refusal::Structure => 0x03,
+        Refusal::Value => 0x21,
+        Refusal::ReadOnly | Refusal::Running | Refusal::Password | Refusal::Locked => 0x22,
+    }
+}
+
 fn registers() -> Vec<Register> {
     let coil = |address, bits| Register::read(spot(Table::Coil, address), Shows::Bits(bits));
     let measured = |address, measure, counts| Register::read(address, Shows::Measured(measure, counts));
     let zero = |address| Register::read(address, Shows::Zero);
+    let no_trip = |address| Register::read(address, Shows::state([255; 4]));
     vec![
         Register::set(RUN, Range::Words(0, 1)),
         Register::set(DIRECTION, Range::Words(0, 1)),
+        Register::set(EXTERNAL_TRIP, Range::Words(0, 1)),
         Register::set(RESET, Range::Words(0, 1)),
         coil(0x000E, vec![Bit::Running(0)].into()),
         coil(0x000F, vec![Bit::Reverse(0)].into()),
@@ -84,6 +104,9 @@ fn registers() -> Vec<Register> {
         // Hundredths of a percent of 400 V.
         measured(0x0013, Measure::Voltage, 25.0),
         zero(0x0018),
-        zero(0x0019),
+        // No trip.
+        no_trip(0x0019),
+        no_trip(0x001A),
+        no_trip(0x001B),
     ]
 }
