@@ -1,10 +1,11 @@
 //! Schneider Altivar 320: what `atv71` does, forward only, and without 08H.
 //!
-//! From a program that runs one (robotsmith/Arduino_ATV320_library): 06H, 07H and then 0FH, 07H stops, 80H resets a fault. From the CANopen
+//! From a program that runs one over its serial line (AnHeart, drive.py), and another over Modbus TCP
+//! (robotsmith/Arduino_ATV320_library): 06H, 07H and then 0FH, 07H stops, 80H resets a fault. From the CANopen
 //! file of product 320 and the list beside it (hilch/ac_invlib): the addresses, STFR at 3281, CHCF from 1 to 3, and the numbers of the
 //! faults, OLF = 17 and SLF1 = 5. From programs that quote its Modbus manual (NVE41308): 03H, 06H and 10H, 63 words.
 //!
-//! - Where it has nothing it says 8000H, and refuses no read (robotsmith/Arduino_ATV320_library).
+//! - Where it has nothing it says 8000H, and refuses no read (AnHeart, scripts/bench_console.py). Unit 248, which it answers too, is not here.
 //! - Assumption: all that an Altivar 71 does else, its I/O profile, and that a run waits for the first setpoint.
 //! - Assumption: 080FH is none of its words. Exceptions are those of the specification.
 
