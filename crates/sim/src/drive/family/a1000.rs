@@ -7,10 +7,10 @@
 //!   are the inputs in bits 4 to 11.
 //! - Assumption: it was set up at its keypad: b1-01 and b1-02 are 2 (0180H and 0181H), o1-03 is 0 (0502H), which counts
 //!   hundredths of a hertz. A write to them needs an Enter command, so they cannot be written here.
-//! - Assumption: 0023H, 0024H and 0026H are set frequency, output frequency and tenths of an ampere. 0032H and the other
+//! - Assumption: 0023H, 0024H and 0026H are set frequency, output frequency and tenths of an ampere, though examples of its sisters call
+//!   0024H U1-01, the setpoint. 0032H and the other
 //!   words between are not here.
-//! - Assumption: it refuses as its sisters do: 01H, 02H, 21H and 22H of a V1000 (manual of its EtherNet/IP option, p. 39), 03H of a
-//!   J1000 (SIEP C710606 33A, p. 206).
+//! - Assumption: it refuses as its sisters do: 01H, 02H, 03H, 21H and 22H of a GA500 (SIEPC71061753C, p. 245).
 //! - Assumption: 0001H and 0002H read as they were written. No output is ever closed (002DH), and there is no PID (0038H, 0039H).
 //! - Ramps have no parameters in the pages at hand; the times are fixed. An overload trips fault 11, which no word shows by
 //!   number. A silent bus trips nothing.
