@@ -7,7 +7,7 @@
 //! - Assumption: it obeys the bus as it comes from the factory, with references of 0 to 50.000 Hz (3-03) and a ramp of 10.00 s; the
 //!   main actual value and 16-02 are shares of 50 Hz.
 //! - Assumption: what else is assumed of an FC 51, and its steps of 16-13 and 16-30. 16-12 counts tenths of a volt, 16-22 reads as 0.
-//! - Assumption: it refuses with 01H to 04H, as its sister series FC 300 prints, and not with 40H to 43H, as one edition does.
+//! - Assumption: it refuses with 01H to 04H, as its sister series FC 300 prints, and not with 00H, 11H and 40H to 43H, as three editions do.
 
 use super::fc51::{CONTROL_WORD, REFERENCE, SHARE, control_word};
 use super::{
