@@ -6,6 +6,7 @@ J1000 User Manual SIEP C710606 33A, pp. 197, 198 and 206; J1000 Technical Manual
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -103,3 +104,32 @@ def test_a_halt_by_the_name_of_its_sister_stops_it(named: str, unit: str) -> Non
         bus.drive(1, named, unverified=True).stop()
         assert line.drive(1).state == "stopped"
         assert line.drive(1).eeprom_writes == 0
+
+
+TENTHS = """name = "tenths"
+source = "made up"
+version = 1
+
+[overlay]
+profile = "j1000"
+
+[variants.speed_unit]
+parameter = "o1-03"
+verified = false
+note = "01 10 00 01 00 02 04 00 01 02 58 63 39 is 60.0 Hz"
+source = "J1000 User Manual SIEP C710606 33A (manualslib 795817), p. 198"
+
+[variants.speed_unit.choices]
+"0.1 Hz" = { value = 0, unit = "Hz", scale = 10, signed = false, low = 0.0, high = 400.0 }
+"""
+
+
+def test_one_that_counts_tenths_has_a_profile_of_its_own(line: Simulator, tmp_path: Path) -> None:
+    """0258H for 60.0 Hz: what the page of its manual prints, and other pages of its sisters do not."""
+    folder = tmp_path / "tenths"
+    folder.mkdir()
+    (folder / "profile.toml").write_text(TENTHS, encoding="utf-8")
+    with Bus(line) as bus:
+        drive = bus.drive(1, folder, unverified=True, variants={"speed_unit": "0.1 Hz"})
+        drive.run(60.0)
+    assert (0x0002, 0x0258) in sent(line)
