@@ -22,12 +22,12 @@ EVERYTHING: dict[str, Callable[[Any], Any]] = {
 
 
 class Unit(NamedTuple):
-    """What makes it obey the bus, address and word; where its own stop goes, and its word; as what it is named."""
+    """What makes it obey the bus, address and word; where its own stop goes, as what it is named, and which words halt it."""
 
     obeys: list[tuple[int, int]]
     command: int
     others: list[str]
-    stop: int = 0
+    halts: frozenset[int] = frozenset({0})
 
 
 UNITS = {
@@ -65,14 +65,14 @@ UNITS = {
             *("ms300", "vfd-e", "yl620", "gs2", "a1000", "j1000", "acs355", "fr-d700", "h100", "gd350", "md500"),
             *("vfd500", "e510", "eds300"),
         ],
-        stop=1,
+        halts=frozenset({1}),
     ),
     # The first takes its commands, and counts another setpoint.
     "vfd-b": Unit(
         [(0x0201, 3), (0x0200, 5)],
         0x2000,
         ["yl620", "gs2", "gd350", "md500", "vfd500", "e510", "eds300", "a1000", "acs355"],
-        stop=1,
+        halts=frozenset({1}),
     ),
     # The first two have parameters where it is commanded; the others are commanded or set where it has something else.
     "vacon10": Unit(
@@ -95,6 +95,8 @@ UNITS = {
             "vfd500",
             "atv312",
         ],
+        # Bit 3 coasts.
+        frozenset({0, 8}),
     ),
 }
 PAIRS = [(unit, other) for unit, known in UNITS.items() for other in known.others]
@@ -115,7 +117,7 @@ def test_by_another_name_nothing_of_it_is_set_or_started(unit: str, named: str, 
         line.advance(10.0)
         drive = line.drive(1)
         assert (drive.state, drive.frequency, drive.eeprom_writes) == ("stopped", 0.0, before)
-        assert {(place, word) for _, place, word in drive.writes()} <= {(known.command, known.stop)}
+        assert {(place, word) for _, place, word in drive.writes()} <= {(known.command, word) for word in known.halts}
 
 
 @pytest.mark.parametrize("what", EVERYTHING)
