@@ -271,11 +271,23 @@ def wish_of(request: Read | Write, *, stamped: bool = False) -> str:
     return text + "".join(f" {name}={number!r}" for name, number in numbers.items() if number is not None)
 
 
+_SPECIFIED = {
+    1: ("illegal_function", "no_such"),
+    2: ("illegal_data_address", "no_such"),
+    3: ("illegal_data_value", "no_such"),
+    4: ("server_device_failure", "not_now"),
+    6: ("server_device_busy", "ask_again"),
+}
+"""What exceptions are called, and mean, where no more is noted: *Modbus Application Protocol* V1.1b3, section 7."""
+
+
 def told_of(error: DrivebusError) -> dict[str, Any]:
     """*error* as a step has it: its class, and what an operation looks at."""
     told: dict[str, Any] = {"error": type(error).__name__}
     if isinstance(error, Refused):
-        return told | {"code": error.code, "name": error.name, "means": error.means}
+        told["code"] = error.code
+        is_usual = _SPECIFIED.get(error.code) == (error.name, error.means)
+        return told if is_usual else told | {"name": error.name, "means": error.means}
     if isinstance(error, _SENT):
         told |= {} if error.started is not None else {"unsent": True}
         told |= {"raw": error.raw.hex().upper()} if error.raw else {}
@@ -290,6 +302,8 @@ def rebuilt(told: dict[str, Any], request: Read | Write | None, started: float, 
     """The error that *told* tells of, of a *request* that began at *started* where it was sent."""
     how: dict[str, Any] = {name: told[name] for name in ("code", "name", "means", "why", "errno") if name in told}
     kind: type[DrivebusError] = getattr(errors, told["error"])
+    if issubclass(kind, Refused) and "name" not in told:
+        how["name"], how["means"] = _SPECIFIED[told["code"]]
     if issubclass(kind, _SENT):
         how |= {"raw": bytes.fromhex(told.get("raw", "")), "ended": ended}
         how |= {} if request is None else {"request": frame_of(request)}

@@ -22,7 +22,7 @@ EVERYTHING: dict[str, Callable[[Any], Any]] = {
 
 
 class Unit(NamedTuple):
-    """What makes it obey the bus, address and word; where its own stop goes, as what it is named, and which words halt it."""
+    """What makes it obey the bus, address and word; where its stop goes, as what it is named, and what halts it."""
 
     obeys: list[tuple[int, int]]
     command: int
