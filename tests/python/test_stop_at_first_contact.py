@@ -45,7 +45,7 @@ QUESTIONS = {
     "optidrive-e3": (8, 140),
     # An ACS355 and others have parameters where this one is commanded.
     "vacon10": (9, 155),
-    # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there; and for 02A8H,
+    # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there; and for 0030H,
     # which a CFW500 has.
     # And for 2649H, its 9802, which a Vacon 10 has not.
     "acs355": (13, 221),

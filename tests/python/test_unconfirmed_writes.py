@@ -144,6 +144,11 @@ def mine(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Profile]:
     return {like: Profile.load(folder / f"my-{like}") for like in FAMILIES}
 
 
+NOT_TOLD_APART = {("optidrive-e3", "gd600"), ("optidrive-e3", "gd3000")}
+"""Its setpoint is at 0001H, where these have P00.01, and they do not say what they are. A profile without a signature has
+nothing to tell them apart by; the page of the format says so."""
+
+
 class TestOfSomebodysOwn:
     @pytest.mark.parametrize("like", FAMILIES)
     @pytest.mark.parametrize("trusted", [False, True], ids=["named", "trusted"])
@@ -165,6 +170,7 @@ class TestOfSomebodysOwn:
         changed = [
             (real, told)
             for real in others(like)
+            if (like, real) not in NOT_TOLD_APART
             for write in kept_elsewhere(mine[like], Profile.builtin(real))
             for exception in REFUSALS.values()
             if (told := try_to_write(mine[like], real, write, exception)) is not None

@@ -119,7 +119,7 @@ TAKEN_FOR: dict[str, list[str]] = {
     "a1000": ["a1000"],
     # And this one 0020H and 0023H; a real A1000 may answer them, too.
     "j1000": ["j1000"],
-    # And this one 02A8H and 02AAH; an ACS355, whose other words it has, refuses the first.
+    # And this one 0030H and 0031H; an ACS355, whose other words it has, refuses the first.
     "cfw500": ["cfw500"],
     # And this one FD00H and FD01H.
     "vf-s15": ["vf-s15"],
