@@ -440,3 +440,64 @@ def test_a_value_that_the_table_has_not_is_asked_for_once_more(there: Path) -> N
     other = there.with_name("other")
     assert asked(other, [*AS_PRINTED[:place], "1-01=7", "y", *AS_PRINTED[place + 1 :]]).exit_code == 0
     assert [(each.code, each.value) for each in drivebus.Profile.load(other).control()] == [("1-01", 7), ("1-02", 3)]
+
+
+IN_BARS = """\
+| Addr. | R/W | Description      | Content                     |
+|-------|-----|------------------|-----------------------------|
+| 3000H | W   | Command          | 0021H forward, 0022H        |
+|       |     |                  | reverse, 0010H stop, 0080H  |
+|       |     |                  | reset                       |
+| 3001H | R/W | Setpoint         | 0.01 % of F1.04             |
+| 3100H | R   | State            | 0 standstill, 1 forward, 2  |
+|       |     |                  | reverse, 7 fault            |
+| 3101H | R   | Fault number     |                             |
+| 3102H | R   | Output frequency | 0.01 Hz                     |
+"""
+IN_GAPS = """\
+Code   Addr.  Function           Setting range                 Fact.
+F1.01  0101H  Command source     0: keypad                     0
+                                 1: terminals
+                                 3: serial
+F1.04  0104H  Maximum frequency  20.0 to 120.0 Hz              50.0
+F4.20  0414H  Serial time-out    0.0 to 60.0 s, 0.0 is off     0.0
+"""
+BY_WORDS = [
+    *("Ostrom OV3", "OV3 manual", "-", *IN_BARS.splitlines(), ".", "63"),
+    *("-", *IN_GAPS.splitlines(), ".", "62", "y", ""),
+    *("Command", "", "0021H", "0022H", "0010H", "", "0080H", "y"),
+    *("Setpoint", "10000 = F1.04", "63", "State", "", "number", "1", "2", "0", "7"),
+    *("Output frequency", "Fault number", "F1.01=serial", "", "", "F4.20", "", "F4.20"),
+    *("", "6", "8", "61", "9600 8-N-1 3", "61"),
+]
+
+
+def test_what_a_table_has_beside_a_register_is_held_against_the_answers(there: Path) -> None:
+    done = asked(there, BY_WORDS)
+    assert done.exit_code == 0, done.output
+    profile = drivebus.Profile.load(there)
+    assert profile.commands() == {"run_forward": 0x21, "run_reverse": 0x22, "stop": 0x10, "reset_fault": 0x80}
+    assert [(each.code, each.value) for each in profile.control()] == [("F1.01", 3)]
+    row = profile.describe("F4.20")
+    assert (row.unit, row.scale, row.low, row.high, row.default) == ("s", 10, 0.0, 60.0, 0.0)
+    serial = profile.serial()
+    assert serial is not None
+    assert (serial.baud_rate, serial.format, serial.unit) == (9600, "8N1", 3)
+    slips = {"0021H": "21", "10000 = F1.04": "0.01 Hz"}
+    for meant, slip in slips.items():
+        place = BY_WORDS.index(meant)
+        again = there.with_name(f"slip{place}")
+        done = asked(again, [*BY_WORDS[:place], slip, "n", *BY_WORDS[place:]])
+        assert (done.exit_code, f"Is it {slip} all the same?" in done.stderr) == (0, True), done.output
+        assert drivebus.Profile.load(again).commands() == profile.commands()
+        assert (again / "profile.toml").read_text(encoding="utf-8").split("\n", 8)[8] == (
+            there / "profile.toml"
+        ).read_text(encoding="utf-8").split("\n", 8)[8]
+    # Who means it says so.
+    place = BY_WORDS.index("0021H")
+    other = there.with_name("other")
+    assert asked(other, [*BY_WORDS[:place], "33", *BY_WORDS[place + 1 :]]).exit_code == 0
+    assert drivebus.Profile.load(other).commands() == profile.commands()
+    willed = there.with_name("willed")
+    assert asked(willed, [*BY_WORDS[:place], "21", "y", *BY_WORDS[place + 1 :]]).exit_code == 0
+    assert drivebus.Profile.load(willed).commands()["run_forward"] == 21

@@ -145,8 +145,8 @@ def mine(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Profile]:
 
 
 NOT_TOLD_APART = {("optidrive-e3", "gd600"), ("optidrive-e3", "gd3000")}
-"""Its setpoint is at 0001H, where these have P00.01, and they do not say what they are. A profile without a signature has
-nothing to tell them apart by; the page of the format says so."""
+"""Its setpoint is at 0001H, where these have P00.01, and they do not say what they are. A profile without a signature
+has nothing to tell them apart by; the page of the format says so."""
 
 
 class TestOfSomebodysOwn:

@@ -137,10 +137,10 @@ def two_numbers(text: str) -> tuple[float, float]:
 
 def line(text: str) -> tuple[int, str, int]:
     """Speed, format and unit of a line."""
-    said = re.fullmatch(r"(\d{3,6})[ ,]+(8[neo][12])[ ,]+(\d{1,3})", text.lower())
+    said = re.fullmatch(r"(\d{3,6})[ ,]+(8-?[neo]-?[12])[ ,]+(\d{1,3})", text.lower())
     if said is None or not 1 <= int(said[3]) <= 247:
         raise WrongUse(f'"{text}" is no speed, format and unit, such as 9600 8N1 1')
-    return int(said[1]), said[2].upper(), int(said[3])
+    return int(said[1]), said[2].replace("-", "").upper(), int(said[3])
 
 
 def command_word(text: str) -> int:

@@ -219,6 +219,11 @@ def take_range(row: TableRow, cells: dict[str, str]) -> None:
     low, high = _plain(cells.get("low", "")), _plain(cells.get("high", ""))
     said = _plain(cells.get("range", "")) or f"{low}-{high}".strip("-")
     found, up_to = _RANGE.fullmatch(said), _UP_TO.fullmatch(said)
+    ends, _, rest = said.partition(", ")
+    if found is None and up_to is None and _RANGE.fullmatch(ends):
+        # `0.0 to 60.0 s, 0.0 is off`
+        found, said = _RANGE.fullmatch(ends), ends
+        row.notes.append(f"the table says {rest!r}")
     if found is not None and row.scale is not None:
         row.low, row.high = found["low"], found["high"]
     elif up_to is not None and row.scale is not None:

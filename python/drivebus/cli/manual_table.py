@@ -40,7 +40,8 @@ _TITLES = {
     "scale": r"scale|scaling",
     "range": r".*\brange\b.*|limits",
     "choices": r"options?|choices|values?|settings?|set(ting)? values?",
-    "default": r"(factory |initial )?(default|setting|value)( value)?|factory( default)?( setting)?|ex[ -]?works",
+    "default": r"(factory |initial )?(default|setting|value)( value)?|factory( default)?( setting)?"
+    r"|fact\.?|ex[ -]?works",
     "low": r"min(\.|imum)?|low",
     "high": r"max(\.|imum)?|high",
     "access": r"r/?w|read/write|access|acc\.?|attributes?|property|change(s|d|able)?( .*)?|modif(y|ication)( .*)?",

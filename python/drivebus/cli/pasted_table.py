@@ -21,7 +21,7 @@ def as_sheet(data: bytes) -> bytes:
     if not titles or data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         return data
     if "|" in titles:
-        cells = [_between_bars(line) for line in lines]
+        cells = _going_on([_between_bars(line) for line in lines])
     elif not re.search(r"[,;\t]", titles) and re.search(r" {2,}", titles):
         cells = _between_gaps(lines)
     else:
@@ -33,6 +33,18 @@ def as_sheet(data: bytes) -> bytes:
 
 def _between_bars(line: str) -> list[str]:
     return [cell.strip() for cell in line.strip().removeprefix("|").removesuffix("|").split("|")]
+
+
+def _going_on(rows: list[list[str]]) -> list[list[str]]:
+    """*rows*, where one whose first cell is empty goes on with the cells above it."""
+    last: list[str] | None = None
+    for number, row in enumerate(rows):
+        if last is not None and any(row) and not row[0] and len(row) == len(last):
+            last[:] = [f"{above} {below}".strip() for above, below in zip(last, row, strict=True)]
+            rows[number] = []
+        elif any(row):
+            last = row if number else None
+    return rows
 
 
 def _between_gaps(lines: list[str]) -> list[list[str]]:

@@ -125,7 +125,7 @@ class _Interview:
         words: dict[str, int] = {}
         elsewhere: dict[str, tuple[TableRow, int]] = {}
         for command, question in _COMMANDS.items():
-            word = self._dialogue.optional(question, values.new(words, values.command_word))
+            word = self._dialogue.optional(question, self._printed(register, words))
             if word is not None:
                 words[command] = word
         reset = self._dialogue.optional(_RESET, lambda text: self._reset(text, register, words))
@@ -150,7 +150,9 @@ class _Interview:
             return None
         source = self._pages.source_of(register)
         register.scale = 1
-        how = self._dialogue.needed("It tells by one number for each state, or by bits", one_of(("number", "bits")))
+        how = self._dialogue.needed(
+            "It tells by one number for each state, or by bits (number, bits)", one_of(("number", "bits"))
+        )
         if how == "number":
             numbers = self._each_state(_STATES, "Number", values.word)
             return State(register, numbers, {}, source) if numbers else None
@@ -163,7 +165,7 @@ class _Interview:
         if row.unit == "Hz" and row.scale is not None:
             return None
         question = "One count of it is, such as 0.01 Hz; or counts that are a frequency, 10000 = P00.03"
-        said = self._dialogue.optional(question, values.speed)
+        said = self._dialogue.optional(question, lambda text: self._as_the_table(row, text, values.speed(text)))
         row.scale = None
         if said is None:
             return None
@@ -175,7 +177,8 @@ class _Interview:
         code = self._parameter(of) if of else self._dialogue.needed(whole, self._parameter)
         if code.scale is None or code.unit != "Hz":
             code.unit = "Hz"
-            code.scale = int(1 / self._dialogue.needed("One count of it is, such as 0.01 Hz", values.hertz))
+            code.scale = int(1 / self._dialogue.needed(f"One count of {code.code} is, such as 0.01 Hz", values.hertz))
+            code.take_printed()
         if not (code.low and code.high):
             ends = f"{code.code} may be from and to, in Hz, such as 10 400"
             low, high = self._dialogue.needed(ends, values.two_numbers)
@@ -185,6 +188,32 @@ class _Interview:
             row.without_range()
         row.unit, row.variant = "", "of_speed"
         return Share(code.code, counts, low, high, self._pages.source())
+
+    def _as_the_table(self, row: TableRow, text: str, said: T) -> T:
+        """What was *said* of a count, as *text*; asked once more where the table has a share, and that is none."""
+        told = next((note for note in row.notes if "%" in note), None)
+        if told is not None and isinstance(said, Fraction):
+            self._is_meant(told, text)
+        return said
+
+    def _printed(self, row: TableRow, words: Mapping[str, int]) -> Callable[[str], int]:
+        """What reads a word of a command; it asks once more where the table has words, and not this one."""
+        told = " ".join(row.notes)
+        printed = re.findall(r"\b([0-9A-Fa-f]{1,4})[Hh]\b|\b0x([0-9A-Fa-f]{1,4})\b", told)
+        numbers = {int(one or other, 16) for one, other in printed}
+        new = values.new(words, values.command_word)
+
+        def read(text: str) -> int:
+            word = new(text)
+            if numbers and word not in numbers:
+                self._is_meant(told, text)
+            return word
+
+        return read
+
+    def _is_meant(self, told: str, text: str) -> None:
+        if not self._dialogue.agreed(f"{told[:1].upper()}{told[1:]}. Is it {text} all the same?", default=False):
+            raise WrongUse(f"{text} is not what the table says")
 
     def _is_in_hertz(self, row: TableRow) -> bool:
         if row.unit != "Hz" or row.scale is None:
@@ -210,7 +239,9 @@ class _Interview:
         code, equals, value = text.partition("=")
         if not equals:
             raise WrongUse(f'"{text}" is no parameter and value, such as P00.01=2')
-        row, word = self._parameter(code.strip()), values.word(value.strip())
+        row = self._parameter(code.strip())
+        called = next((number for number, label in row.choices.items() if label.lower() == value.strip().lower()), None)
+        word = values.word(value.strip()) if called is None else called
         if row.choices and word not in row.choices:
             known = ", ".join(f"{number} {label}" for number, label in row.choices.items())
             if not self._dialogue.agreed(f"The table has {known}. Is {word} printed all the same?", default=False):
@@ -332,7 +363,11 @@ class _Interview:
         return found
 
     def _known_or_place(self, text: str) -> TableRow | int:
-        row = next((row for row in self.table.rows if text.lower() in {row.name, row.code.lower() or None}), None)
+        called = " ".join(text.lower().split())
+        names = [{row.name, row.label.lower(), row.code.lower() or None} for row in self.table.rows]
+        found = [row for row, known in zip(self.table.rows, names, strict=True) if called in known]
+        # Several may have the same label.
+        row = found[0] if len(found) == 1 else next((row for row in found if called == row.name), None)
         if row is not None:
             return row
         table, address = values.place(text)
