@@ -103,8 +103,8 @@ fn any_case() -> impl Strategy<Value = Case> {
 struct Came {
     script: Script,
     done: Result<(), NotKept<Fault>>,
-    /// The words of all that was sent, by their plain addresses.
-    words: Vec<(Place, u16)>,
+    /// The one or two words of each value that was sent, by their plain addresses.
+    words: Vec<(Place, Vec<u16>)>,
     /// Whether nothing was to be written.
     is_empty: bool,
 }
@@ -131,8 +131,13 @@ fn carried_out(case: &Case) -> Came {
     let mut words = Vec::new();
     for (_, write) in &script.sent {
         let plain = profile.stored_address(write.place).unwrap_or(write.place.address);
-        let places = (plain..).map(|address| Place { address, ..write.place });
-        words.extend(places.zip(words_of(write)));
+        let (sent, mut at) = (words_of(write), 0);
+        while at < sent.len() {
+            let place = Place { address: plain + u16::try_from(at).unwrap(), ..write.place };
+            let count = profile.written_entry_at(place).map_or(1, |entry| usize::from(entry.words()));
+            words.push((place, sent[at..at + count].to_vec()));
+            at += count;
+        }
     }
     Came { script, done, words, is_empty }
 }
@@ -140,7 +145,9 @@ fn carried_out(case: &Case) -> Came {
 fn holds(case: &Case, outcome: &Came) {
     let profile = case.unit.family.profile();
     let store = profile.store_word().map(|(store, place)| (place, store.word));
-    for &(place, word) in outcome.words.iter().filter(|&&sent| Some(sent) != store) {
+    let is_value = |sent: &&(Place, Vec<u16>)| store.is_none_or(|(place, word)| **sent != (place, vec![word]));
+    for (place, words) in outcome.words.iter().filter(is_value) {
+        let place = *place;
         let entry = profile.written_entry_at(place).unwrap();
         assert!(!profile.is_command(place), "{} can move the motor", entry.name());
         assert!(entry.access() != Access::Ro, "{} can only be read", entry.name());
@@ -150,13 +157,13 @@ fn holds(case: &Case, outcome: &Came) {
         let chosen = variant.into_iter().flat_map(|variant| variant.choices.values().map(|choice| &choice.quantity));
         let own = Some(entry.quantity()).filter(|_| variant.is_none());
         let is_within = own.into_iter().chain(chosen).any(|quantity| {
-            let value = quantity.decode(word).to_f64();
+            let value = quantity.decode_words(words).unwrap().to_f64();
             quantity.low().is_none_or(|low| value >= low.to_f64())
                 && quantity.high().is_none_or(|high| value <= high.to_f64())
         });
         // A share has its range in counts, of whatever the parameter says.
         let is_share = variant.is_some_and(|variant| variant.share.is_some());
-        assert!(is_within || is_share, "{} = {word}", entry.name());
+        assert!(is_within || is_share, "{} = {words:?}", entry.name());
     }
     let stores =
         |write: &Write| store.is_some_and(|(place, word)| (write.place, words_of(write)) == (place, vec![word]));
