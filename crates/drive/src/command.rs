@@ -16,7 +16,7 @@ pub use not_commanded::{NotCommanded, NotLedUp, WhyNotCommanded, WhyNotLedUp};
 use crate::families::Families;
 use crate::look::Look;
 use crate::ready::NotReady;
-use crate::task::{LineError, Mailbox, Notice, Payload, WRITE_MANY};
+use crate::task::{LineError, Mailbox, Notice, Payload};
 use crate::unit::Unit;
 use crate::writing::{NotWritten, Words};
 use sent::Shown;
@@ -225,8 +225,7 @@ impl Unit {
         let Some(frequency) = frequency else { return Ok(Payload::Word(code)) };
         let register = self.frequency_register().and_then(drivebus_drives::Entry::place);
         let is_next = register.is_some_and(|register| register.number() == place.number() + 1);
-        let takes_two = self.profile().functions().contains(&WRITE_MANY) && self.profile().requests().max_written > 1;
-        if is_next && takes_two {
+        if is_next && self.profile().requests().writes_two() {
             return Ok(Payload::Words(vec![code, frequency]));
         }
         let written = self.write_frequency(line, families, frequency).await;

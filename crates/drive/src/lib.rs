@@ -154,7 +154,7 @@ pub use speed::{Frequencies, Ramp, STANDSTILL, Speeds};
 pub use status::Status;
 pub use taken::Taken;
 pub use unit::Unit;
-pub use values::{NotRead, Values};
+pub use values::{NotRead, NotThere, Values};
 pub use waits::NotReached;
 pub use writing::{NotWritten, Words};
 

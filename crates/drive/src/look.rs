@@ -8,7 +8,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use drivebus_drives::{BitField, Entry, Fault, Profile, ReadPlan, State};
+use drivebus_drives::{BitField, Entry, Fault, Profile, ReadPlan, State, Value};
 use drivebus_rtu::{Instant, UnitAddress};
 
 use crate::planned::read_planned;
@@ -217,7 +217,7 @@ impl Looks {
         let (mut state, mut fault, mut fields) = (None, None, Vec::new());
         let values = self.plan.iter().flat_map(|plan| plan.values(came));
         for (word, (_, value)) in self.words.iter().zip(values) {
-            let Some(raw) = value.and_then(|value| u16::try_from(value.count() & 0xFFFF).ok()) else { continue };
+            let Some(raw) = value.map(Value::word) else { continue };
             match word.role {
                 Role::State => state = Some(raw),
                 Role::Fault => fault = Some(raw),

@@ -87,7 +87,7 @@ fn check_deciding<E>(profile: &Profile, wanted: &[(&str, Input<'_>)]) -> Result<
         let Some(choice) = profile.chosen().get(variant) else { continue };
         let words = entry.encode_words(*value);
         let words = words.map_err(|why| Why::NotPlanned(NotPlanned::of(name, WhyNotPlanned::Unfit(why))))?;
-        if profile.choice_of(variant, entry.raw(&words)).as_ref() != Some(choice) {
+        if profile.choice_of(variant, entry.quantity().raw(&words)).as_ref() != Some(choice) {
             let (name, variant, choice) = ((*name).to_owned(), variant.clone(), choice.clone());
             return Err(Why::Unsays { name, variant, choice });
         }

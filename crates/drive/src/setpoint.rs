@@ -94,7 +94,7 @@ impl Unit {
         let Some(limit) = quantity.high_from() else { return Ok(word) };
         let came = match self.read_values(line, &[limit]).await {
             Ok(came) => came.values,
-            Err(NotRead::Unknown(_) | NotRead::MayNot { .. } | NotRead::Absent { .. }) => return Ok(word),
+            Err(NotRead::Unknown(_) | NotRead::MayNot { .. } | NotRead::Absent(_)) => return Ok(word),
             Err(NotRead::NotSettled(why)) => return Err(NotSet::NotSettled(why)),
             Err(NotRead::Failed(error)) => return Err(NotSet::Failed(error)),
         };

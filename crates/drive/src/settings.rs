@@ -110,7 +110,7 @@ impl Unit {
         let actual = |row: &Control, entry: &Entry, value: Value| match row.bits {
             None => value,
             // A word of bits has all of them.
-            Some(_) => entry.decode(row.found(u16::try_from(value.count() & 0xFFFF).unwrap_or_default())),
+            Some(_) => entry.decode(row.found(value.word())),
         };
         let setting = |(wanted, entry): (Control, Option<&Entry>)| Setting {
             actual: entry.and_then(|entry| values.next().map(|value| actual(&wanted, entry, value))),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use drivebus_drives::{Control, Entry, Profile, ReadPlan, Setpoint, State};
+use drivebus_drives::{Control, Entry, Profile, ReadPlan, Setpoint, State, Value};
 use drivebus_rtu::UnitAddress;
 
 use crate::rule::Rule;
@@ -99,7 +99,7 @@ impl Speeds {
         is_urgent: bool,
     ) -> Result<Option<Frequencies>, E> {
         let Some(plan) = &self.both else { return Ok(None) };
-        let mut values = values_of(plan, line, unit, is_urgent).await?.into_iter().map(|(value, _)| value.abs());
+        let mut values = values_of(plan, line, unit, is_urgent).await?.into_iter().map(|value| value.to_f64().abs());
         Ok(values.next().map(|output| Frequencies { output, setpoint: values.next() }))
     }
 
@@ -110,7 +110,7 @@ impl Speeds {
     /// Those of the line.
     pub async fn output<E>(&self, line: &Mailbox<E>, unit: UnitAddress, is_urgent: bool) -> Result<Option<f64>, E> {
         let Some(plan) = &self.output else { return Ok(None) };
-        Ok(values_of(plan, line, unit, is_urgent).await?.first().map(|(value, _)| value.abs()))
+        Ok(values_of(plan, line, unit, is_urgent).await?.first().map(|value| value.to_f64().abs()))
     }
 
     /// Whether a motor whose `state` says that it rests still turns, in a family whose word may say so on the ramp.
@@ -149,11 +149,11 @@ impl Speeds {
             },
         };
         let (mut seconds, mut hertz, mut set) = (0.0, 0.0, 0);
-        for (told, (value, count)) in self.told.iter().zip(values) {
+        for (told, value) in self.told.iter().zip(values) {
             match *told {
-                Told::Time => seconds = value,
-                Told::Start => hertz = value,
-                Told::Setting { mask, word } => set += usize::from(count & i64::from(mask) == i64::from(word)),
+                Told::Time => seconds = value.to_f64(),
+                Told::Start => hertz = value.to_f64(),
+                Told::Setting { mask, word } => set += usize::from(value.word() & mask == word),
             }
         }
         Ok(Ramp {
@@ -163,20 +163,15 @@ impl Speeds {
     }
 }
 
-/// The values of `plan`, each with the counts that it is.
-async fn values_of<E>(
-    plan: &ReadPlan,
-    line: &Mailbox<E>,
-    unit: UnitAddress,
-    is_urgent: bool,
-) -> Result<Vec<(f64, i64)>, E> {
+/// The values of `plan`; none where the drive has not all of them.
+async fn values_of<E>(plan: &ReadPlan, line: &Mailbox<E>, unit: UnitAddress, is_urgent: bool) -> Result<Vec<Value>, E> {
     let mut words = Vec::with_capacity(plan.words());
     for span in plan.reads() {
         words.extend(line.read(Read::words(unit, span.place(), span.count).urgent(is_urgent)).await?);
     }
     // Where one of them is not there, none can be told from another.
     let values: Option<Vec<_>> = plan.told(&words).map(|(_, value)| value).collect();
-    Ok(values.into_iter().flatten().map(|value| (value.to_f64(), value.count())).collect())
+    Ok(values.unwrap_or_default())
 }
 
 #[cfg(test)]

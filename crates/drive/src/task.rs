@@ -18,7 +18,6 @@ use drivebus_rtu::{Instant, UnitAddress};
 use thiserror::Error;
 
 pub use line_error::{Cause, LineError};
-pub(crate) use wish::WRITE_MANY;
 pub use wish::{Link, Notice, Payload, Read, Stamped, Wish, Write};
 
 use crate::family::Family;

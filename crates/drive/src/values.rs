@@ -44,16 +44,22 @@ pub enum NotRead<E> {
     #[error("{0}")]
     NotSettled(NotSettled<E>),
     /// The drive has nothing there, and says so by a word.
-    #[error("the drive has no {name}: it answered {word:04X}H, which says so; leave {name} out")]
-    Absent {
-        /// What it was called.
-        name: String,
-        /// The word.
-        word: u16,
-    },
+    #[error("{}; leave {} out", .0, .0.name)]
+    Absent(NotThere),
     /// The line failed, or the unit refused.
     #[error("{0}")]
     Failed(E),
+}
+
+/// Something that a drive says that it has not.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("the drive has no {name}: it answered {word:04X}H, which says so")]
+#[non_exhaustive]
+pub struct NotThere {
+    /// What it was called.
+    pub name: String,
+    /// The word by which it says so.
+    pub word: u16,
 }
 
 impl Unit {
@@ -65,7 +71,7 @@ impl Unit {
     pub async fn read_values<E: LineError>(&self, line: &Mailbox<E>, names: &[&str]) -> Result<Values, NotRead<E>> {
         let told = self.read_told(line, names).await?;
         let word = told.profile.requests().absent.unwrap_or_default();
-        let absent = |name: &str| NotRead::Absent { name: name.to_owned(), word };
+        let absent = |name: &str| NotRead::Absent(NotThere { name: name.to_owned(), word });
         let values = names.iter().zip(told.values).map(|(name, value)| value.ok_or_else(|| absent(name)));
         let (profile, asked, answered) = (told.profile, told.asked, told.answered);
         Ok(Values { values: values.collect::<Result<_, _>>()?, profile, asked, answered })

@@ -23,7 +23,7 @@ fn unread(why: NotRead<Error>) -> Error {
     match why {
         NotRead::Failed(error) => error,
         NotRead::NotSettled(why) => why.into(),
-        why @ NotRead::Absent { .. } => Error::of(ErrorKind::BadAnswer, why),
+        why @ NotRead::Absent(_) => Error::of(ErrorKind::BadAnswer, why),
         why => Error::not_allowed(why),
     }
 }

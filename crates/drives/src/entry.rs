@@ -196,12 +196,6 @@ impl Entry {
         self.quantity.encode(&self.name, &value.into())
     }
 
-    /// The bits of all its `words`, which stand in the order of their addresses.
-    pub fn raw(&self, words: &[u16]) -> u32 {
-        let behind = |high: u32, &low: &u16| high << 16 | u32::from(low);
-        if self.quantity.is_high_first() { words.iter().fold(0, behind) } else { words.iter().rev().fold(0, behind) }
-    }
-
     /// The words for `value`, as many as the entry [has](Self::words), in the order of their addresses.
     ///
     /// # Errors

@@ -115,14 +115,21 @@ impl Quantity {
 
     /// The value of `words`, which has [as many](Self::words) as it takes, in the order of their addresses; `None` if it has not.
     pub fn decode_words(&self, words: &[u16]) -> Option<Value> {
-        match (self.wide, words) {
-            (false, &[word]) => Some(self.decode(word)),
-            (true, &[first, second]) => {
-                let (low, high) = if self.high_first { (second, first) } else { (first, second) };
-                let raw = u32::from(high) << 16 | u32::from(low);
-                Some(self.value(if self.signed { i64::from(raw.cast_signed()) } else { i64::from(raw) }))
-            }
-            _ => None,
+        (words.len() == usize::from(self.words())).then(|| self.decode_raw(self.raw(words)))
+    }
+
+    /// The bits of all its `words`, which stand in the order of their addresses.
+    pub fn raw(&self, words: &[u16]) -> u32 {
+        let behind = |high: u32, &low: &u16| high << 16 | u32::from(low);
+        if self.high_first { words.iter().fold(0, behind) } else { words.iter().rev().fold(0, behind) }
+    }
+
+    /// The value of the bits of all its words; of one word, of the low ones.
+    pub fn decode_raw(&self, raw: u32) -> Value {
+        match (self.wide, self.signed) {
+            (false, _) => self.decode(to_word(raw.into())),
+            (true, false) => self.value(raw.into()),
+            (true, true) => self.value(raw.cast_signed().into()),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::quantity::to_word;
 use crate::scale::Scale;
 
 /// A value as a decimal number, and the counts that it is. `Display` prints every decimal: `10.00`.
@@ -22,6 +23,11 @@ impl Value {
     /// The counts of the drive, with their sign: what its word is, and not the value where there is a scale.
     pub fn count(self) -> i64 {
         self.count
+    }
+
+    /// The low word of the counts, in two's complement: of one word, that word.
+    pub fn word(self) -> u16 {
+        to_word(self.count)
     }
 
     /// The float closest to this value. It prints with no more digits than the value has.

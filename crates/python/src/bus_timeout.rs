@@ -145,9 +145,8 @@ fn read_told(py: Python<'_>, why: NotRead<Failed>) -> PyResult<Told> {
         NotRead::MayNot { name, .. } => ("may_not", name.into_py_any(py)?),
         NotRead::NotSettled(why) => ("not_settled", settled_told(py, why)?.into_py_any(py)?),
         NotRead::Failed(error) => ("failed", raised(py, error)?),
-        NotRead::Absent { name, word } => {
-            let message = format!("the drive has no {name}: it answered {word:04X}H, which says so");
-            ("failed", Class::BadAnswer.raise(message, |_| Ok(())).into_value(py).into_any())
+        NotRead::Absent(why) => {
+            ("failed", Class::BadAnswer.raise(why.to_string(), |_| Ok(())).into_value(py).into_any())
         }
         why => return Err(unknown(&why)),
     })

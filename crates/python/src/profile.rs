@@ -237,18 +237,13 @@ impl Profile {
         let both: u32 = raw
             .extract()
             .map_err(|_| bad_argument(format!("raw {} is not a number from 0 to 4294967295", shown(raw))))?;
-        let mut words = [both & 0xFFFF, both >> 16].map(|word| u16::try_from(word).unwrap_or_default());
-        if quantity.is_high_first() {
-            words.reverse();
-        }
-        let value = quantity.decode_words(&words);
-        value.map(|value| number(name.py(), quantity, value)).ok_or_else(|| bad_argument("no words".to_owned()))
+        Ok(number(name.py(), quantity, quantity.decode_raw(both)))
     }
 
     #[pyo3(signature = (name, value, /))]
     fn encode(&self, name: &Bound<'_, PyAny>, value: &Bound<'_, PyAny>) -> PyResult<u32> {
         let entry = self.find(name)?;
-        entry.encode_words(given(&entry, value)?.input()).map(|words| entry.raw(&words)).map_err(refuse)
+        entry.encode_words(given(&entry, value)?.input()).map(|words| entry.quantity().raw(&words)).map_err(refuse)
     }
 
     #[pyo3(signature = (name, raw, /))]

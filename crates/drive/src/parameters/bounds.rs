@@ -71,7 +71,7 @@ impl Unit {
         let entries: Vec<_> = names.iter().filter_map(|name| unit.profile().find(name).ok()).collect();
         let mut values = unit.values(line, &entries).await.map_err(Why::Failed)?.into_iter();
         if let Some(word) = state.and_then(|_| values.next()) {
-            let state = profile.state(u16::try_from(word.count() & 0xFFFF).unwrap_or_default());
+            let state = profile.state(word.word());
             line.taken_for(self.address(), self.family()).tell(Notice::Shows(state)).await;
             if state.is_running() {
                 let names = only_stopped.iter().map(|item| item.name.to_owned()).collect();

@@ -32,17 +32,13 @@ impl Planned<'_> {
     }
 
     pub(super) fn value(&self) -> Value {
-        self.meant_by(&self.words)
+        self.entry.quantity().decode_raw(self.entry.quantity().raw(&self.words))
     }
 
     /// The same with `words` in its place.
     pub(super) fn held(&self, words: &[u16]) -> Held {
-        Held::of(self.name, &self.entry, self.meant_by(words))
-    }
-
-    fn meant_by(&self, words: &[u16]) -> Value {
-        // There are as many as it has.
-        self.entry.quantity().decode_words(words).unwrap_or_else(|| self.entry.decode(0))
+        let quantity = self.entry.quantity();
+        Held::of(self.name, &self.entry, quantity.decode_raw(quantity.raw(words)))
     }
 }
 
@@ -77,7 +73,7 @@ impl Unit {
             return Err(Why::OnlyStored);
         }
         let words = entry.encode_words(value).map_err(Why::Unfit)?;
-        let raw = entry.raw(&words);
+        let raw = entry.quantity().raw(&words);
         rule.word(entry, raw).map_err(|_| Why::NoRange(raw))?;
         let place = profile.write_address(entry, store).map_err(Why::NoPlace)?;
         rule.kept(entry, store).map_err(|why| Why::MayNotKeep(why.to_string()))?;

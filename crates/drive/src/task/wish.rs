@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use drivebus_drives::{Command, Place, Profile, State};
+use drivebus_drives::{Command, Place, Profile, Requests, State};
 use drivebus_rtu::UnitAddress;
 
 use super::Outcome;
@@ -11,9 +11,6 @@ use crate::look::Look;
 use crate::set_otherwise::SetOtherwise;
 
 const WRITE_ONE: u8 = 0x06;
-
-/// By which function several words are written.
-pub(crate) const WRITE_MANY: u8 = 0x10;
 
 /// What an operation wants done before it goes on.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -180,7 +177,7 @@ impl Payload {
     pub fn as_written(self, profile: &Profile) -> Self {
         let knows = |function| profile.functions().contains(&function);
         match self {
-            Self::Word(word) if !knows(WRITE_ONE) && knows(WRITE_MANY) => Self::Words(vec![word]),
+            Self::Word(word) if !knows(WRITE_ONE) && knows(Requests::WRITE_MANY) => Self::Words(vec![word]),
             payload => payload,
         }
     }

@@ -14,9 +14,6 @@ use crate::parts::setpoint::Setpoint;
 use crate::place::{Place, Table};
 use crate::profile::Profile;
 
-/// The function that writes several words.
-const WRITE_MANY: u8 = 0x10;
-
 /// Checks the whole `profile`, which is put together.
 pub(super) fn check(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
     memory(file, manifest, profile, problems);
@@ -135,7 +132,7 @@ fn protocol(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut 
 
 /// Two words are written by one request, so that the drive never has one half of a value.
 fn wide(file: &File, manifest: &Manifest, profile: &Profile, problems: &mut Problems) {
-    if profile.functions().contains(&WRITE_MANY) && profile.requests().max_written > 1 {
+    if profile.requests().writes_two() {
         return;
     }
     let at = manifest.requests.as_ref().map_or(1, |requests| line(file, &requests.max_words));

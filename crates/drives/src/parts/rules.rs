@@ -76,6 +76,16 @@ pub struct Requests {
     pub source: String,
 }
 
+impl Requests {
+    /// The function that writes several words.
+    pub const WRITE_MANY: u8 = 0x10;
+
+    /// Whether one request may write two words.
+    pub fn writes_two(&self) -> bool {
+        self.functions.contains(&Self::WRITE_MANY) && self.max_written > 1
+    }
+}
+
 /// Parameters that need care, by code.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Groups {

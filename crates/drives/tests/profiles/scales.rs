@@ -192,10 +192,10 @@ fn a_parameter_of_two_words_is_written_where_one_request_can() {
     // 70000 hundredths are 0001 1170H; -2 is FFFF FFFEH, whose low word comes first.
     let ramp = profile.find("3-42").unwrap();
     assert_eq!(ramp.encode_words(Input::Decimal("700")), Ok(vec![0x0001, 0x1170]));
-    assert_eq!(ramp.raw(&[0x0001, 0x1170]), 70_000);
+    assert_eq!(ramp.quantity().raw(&[0x0001, 0x1170]), 70_000);
     let step = profile.find("3-44").unwrap();
     assert_eq!(step.encode_words(-2), Ok(vec![0xFFFE, 0xFFFF]));
-    assert_eq!(step.raw(&[0xFFFE, 0xFFFF]), 0xFFFF_FFFE);
+    assert_eq!(step.quantity().raw(&[0xFFFE, 0xFFFF]), 0xFFFF_FFFE);
     assert!(ramp.encode_words(Input::Decimal("42949672.96")).is_err());
     assert!(matches!(ramp.encode(1), Err(ValueError::TwoWords { .. })));
 
