@@ -151,7 +151,7 @@ impl Drive {
     ) -> Result<Answer<'a>, Refusal> {
         match *request {
             Request::Read { table, address, count, .. } => {
-                self.check_count(count)?;
+                check_count(count, self.family().max_words)?;
                 self.check_unlocked()?;
                 self.check_groups(address, count)?;
                 self.check_single(address, count)?;
@@ -181,11 +181,8 @@ impl Drive {
                 self.write(now, spot(Table::Coil, address), Words::new(&[on.into()]))?;
             }
             Request::WriteMultiple { address, words, .. } => {
-                let count = u16::try_from(words.len()).unwrap_or(u16::MAX);
-                self.check_count(count)?;
-                if self.family().roles.max_written.is_some_and(|most| count > most) {
-                    return Err(Refusal::Structure);
-                }
+                let most = self.family().roles.max_written.unwrap_or(self.family().max_words);
+                check_count(u16::try_from(words.len()).unwrap_or(u16::MAX), most)?;
                 self.write(now, address.into(), words)?;
             }
             // Assumption: the echo works on a locked drive; it reads and writes nothing.
@@ -193,10 +190,6 @@ impl Drive {
             _ => return Err(Refusal::Function),
         }
         Answer::confirming(request).ok_or(Refusal::Function)
-    }
-
-    fn check_count(&self, count: u16) -> Result<(), Refusal> {
-        if (1..=self.family().max_words).contains(&count) { Ok(()) } else { Err(Refusal::Structure) }
     }
 
     /// Whether the read of `count` words from `address` on stays where the family lets one stay.
@@ -413,4 +406,8 @@ impl Drive {
             self.machine.command(command, &self.settings);
         }
     }
+}
+
+fn check_count(count: u16, most: u16) -> Result<(), Refusal> {
+    if (1..=most).contains(&count) { Ok(()) } else { Err(Refusal::Structure) }
 }

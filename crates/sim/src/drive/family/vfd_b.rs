@@ -1,4 +1,4 @@
-//! Delta VFD-B: commands and setpoint of an MS300, one decimal in the current, and words at 2108H and 2109H where a VFD-E has its voltages.
+//! Delta VFD-B: what `vfd_e` does, and its voltages where that has others: one decimal in the current, words at 2108H and 2109H.
 //!
 //! VFD-B manual of October 2005, pp. 76, 154 and 162 (5-16, 5-94 and 5-102); the bits of 2000H from LinuxCNC's vfdb_vfd.c, which also
 //! sends 11H and 21H, and p. 514 of the CP2000 manual; those of 2101H from pp. 440 and 441 of the VFD-ED manual; 02-00 and 02-01 from
@@ -19,62 +19,24 @@
 
 use std::borrow::Cow;
 
-use super::{
-    Bit, Family, Faults, Flag, Kind, Measure, Memory, Parameter, Range, Register, Roles, Shows, Speed, USUAL_DELAY,
-    USUAL_MAX_HZ,
-};
-use crate::drive::machine::{Command, Direction};
-use crate::drive::refusal::by_the_specification;
+use super::{Bit, Family, Flag, Measure, Parameter, Range, Register, Roles, Shows, vfd_e};
 
 const FREQUENCY_SOURCE: u16 = 0x0200;
 const COMMAND_SOURCE: u16 = 0x0201;
 const BUS_FORMAT: u16 = 0x0904;
 
 pub(crate) fn vfd_b() -> Family {
+    let sister = vfd_e::vfd_e();
     Family {
         name: "vfd-b".into(),
-        kind: Kind::Inverter,
         functions: vec![0x03, 0x06],
         max_words: 20,
-        across_groups: true,
-        exception: by_the_specification,
-        memory: Memory::EepromOnly,
-        identification: 0,
-        command: Some(0x2000),
-        commands: COMMANDS.to_vec(),
         registers: REGISTERS.to_vec(),
         parameters: PARAMETERS.to_vec(),
-        factory: &[],
-        elsewhere: vec![(0x2002, 0, Command::Nothing), (0x2002, 2, Command::ResetFault)],
-        control_word: None,
-        capped: &[],
-        roles: Roles {
-            obeys: vec![(COMMAND_SOURCE, 3)],
-            speed_source: Some(vec![(COMMAND_SOURCE, 3), (FREQUENCY_SOURCE, 5)]),
-            speed: Some(Speed::hertz(0x2001)),
-            reads_single_parameters: true,
-            ..Roles::NONE
-        },
-        delay: USUAL_DELAY,
-        max_hertz: USUAL_MAX_HZ,
-        faults: Faults { overload: Some(7), silent_bus: None },
+        roles: Roles { speed_source: Some(vec![(COMMAND_SOURCE, 3), (FREQUENCY_SOURCE, 5)]), ..sister.roles },
+        ..sister
     }
 }
-
-/// 2000H, by its bits 1-0 and 5-4.
-const COMMANDS: &[(u16, Command)] = &[
-    (0x00, Command::Nothing),
-    (0x01, Command::Stop),
-    (0x02, Command::Run(Direction::Forward)),
-    (0x04, Command::Nothing),
-    (0x05, Command::Stop),
-    (0x06, Command::Run(Direction::Forward)),
-    (0x08, Command::Nothing),
-    (0x11, Command::Stop),
-    (0x12, Command::Run(Direction::Forward)),
-    (0x21, Command::Stop),
-    (0x22, Command::Run(Direction::Reverse)),
-];
 
 /// p. 162.
 const REGISTERS: &[Register] = &[
