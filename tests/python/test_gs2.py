@@ -13,6 +13,8 @@ import pytest
 
 from drivebus import Bus, Drive, NotAllowed, Simulator, State
 
+from .obedient import obedient, written
+
 SETPOINT, RUN, DIRECTION, EXTERNAL_FAULT, RESET = 0x091A, 0x091B, 0x091C, 0x091D, 0x091E
 SOURCES = [(0x0300, 3), (0x0400, 5)]
 """P3.00 = 3 and P4.00 = 5."""
@@ -21,11 +23,7 @@ SOURCES = [(0x0300, 3), (0x0400, 5)]
 @pytest.fixture
 def line() -> Iterator[Simulator]:
     """One whose P3.00 and P4.00 somebody has set."""
-    with Simulator({1: "gs2"}, transport="process", clock="virtual") as simulator:
-        with Bus(simulator) as bus:
-            for address, word in SOURCES:
-                bus.write(1, address, word)
-        simulator.drive(1).take_writes()
+    with obedient("gs2", SOURCES) as simulator:
         yield simulator
 
 
@@ -33,10 +31,6 @@ def line() -> Iterator[Simulator]:
 def drive(line: Simulator) -> Iterator[Drive]:
     with Bus(line) as bus:
         yield bus.drive(1, "gs2", unverified=True)
-
-
-def written(line: Simulator) -> list[tuple[int, int]]:
-    return [(place, word) for _, place, word in line.drive(1).take_writes()]
 
 
 def test_the_direction_goes_first_and_the_run_alone(line: Simulator, drive: Drive) -> None:

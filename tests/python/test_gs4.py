@@ -12,6 +12,8 @@ import pytest
 
 from drivebus import Bus, Drive, NotAllowed, Profile, Simulator, State
 
+from .obedient import obedient, written
+
 COMMAND, SETPOINT, FAULTS = 0x2000, 0x2001, 0x2002
 SOURCES = [(0x0300, 3), (0x0400, 1)]
 """P3.00 = 3 and P4.00 = 1."""
@@ -20,11 +22,7 @@ SOURCES = [(0x0300, 3), (0x0400, 1)]
 @pytest.fixture
 def line() -> Iterator[Simulator]:
     """One whose P3.00 and P4.00 somebody has set."""
-    with Simulator({1: "gs4"}, transport="process", clock="virtual") as simulator:
-        with Bus(simulator) as bus:
-            for address, word in SOURCES:
-                bus.write(1, address, word)
-        simulator.drive(1).take_writes()
+    with obedient("gs4", SOURCES) as simulator:
         yield simulator
 
 
@@ -32,10 +30,6 @@ def line() -> Iterator[Simulator]:
 def drive(line: Simulator) -> Iterator[Drive]:
     with Bus(line) as bus:
         yield bus.drive(1, "gs4", unverified=True)
-
-
-def written(line: Simulator) -> list[tuple[int, int]]:
-    return [(place, word) for _, place, word in line.drive(1).take_writes()]
 
 
 def test_its_words_are_those_of_a_delta_drive(line: Simulator, drive: Drive) -> None:

@@ -13,6 +13,8 @@ import pytest
 
 from drivebus import Bus, Drive, NotAllowed, Simulator, State
 
+from .obedient import obedient, written
+
 COMMAND, SETPOINT, FAULTS = 0x2000, 0x2001, 0x2002
 SOURCES = [(0x0201, 3), (0x0200, 5)]
 """02-01 = 3 and 02-00 = 5."""
@@ -21,11 +23,7 @@ SOURCES = [(0x0201, 3), (0x0200, 5)]
 @pytest.fixture
 def line() -> Iterator[Simulator]:
     """One whose 02-00 and 02-01 somebody has set."""
-    with Simulator({1: "vfd-b"}, transport="process", clock="virtual") as simulator:
-        with Bus(simulator) as bus:
-            for address, word in SOURCES:
-                bus.write(1, address, word)
-        simulator.drive(1).take_writes()
+    with obedient("vfd-b", SOURCES) as simulator:
         yield simulator
 
 
@@ -33,10 +31,6 @@ def line() -> Iterator[Simulator]:
 def drive(line: Simulator) -> Iterator[Drive]:
     with Bus(line) as bus:
         yield bus.drive(1, "vfd-b", unverified=True)
-
-
-def written(line: Simulator) -> list[tuple[int, int]]:
-    return [(place, word) for _, place, word in line.drive(1).take_writes()]
 
 
 def test_it_runs_by_the_words_that_programs_send(line: Simulator, drive: Drive) -> None:
