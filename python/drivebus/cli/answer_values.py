@@ -116,9 +116,9 @@ def step(text: str, unit: str) -> Fraction:
 def speed(text: str) -> Fraction | tuple[int, str]:
     """What one count is; or how many counts are a parameter, by its code, which may follow."""
     share = re.fullmatch(r"(\d*[.,]?\d+) ?%.*", text)
-    step = Fraction(share[1].replace(",", ".")) if share else Fraction(0)
+    part = Fraction(share[1].replace(",", ".")) if share else Fraction(0)
     whole = re.fullmatch(r"(\d{2,5}) ?= ?(.+)", text)
-    counts = 100 / step if step else Fraction(whole[1]) if whole else None
+    counts = 100 / part if part else Fraction(whole[1]) if whole else None
     if counts is None:
         return hertz(text)
     if counts.denominator != 1 or counts > 0xFFFF:
@@ -155,11 +155,11 @@ def command_word(text: str) -> int:
 
 def functions(text: str) -> list[int]:
     """The functions that write words."""
-    found = {"6": [6], "06": [6], "16": [16], "10h": [16]}
-    numbers = [found.get(part.lower()) for part in re.split(r"[, ]+|and", text) if part]
-    if not numbers or None in numbers:
+    known = {"6": 6, "06": 6, "16": 16, "10h": 16}
+    said = {part for part in re.split(r"[, ]+|and", text.lower()) if part}
+    if not said or not said <= set(known):
         raise WrongUse(f'"{text}" is neither 6, 16 nor "6, 16"')
-    return sorted({number for each in numbers for number in each or []})
+    return sorted({known[part] for part in said})
 
 
 _FAULT = re.compile(r"(\d{1,5})[ :=,;.\t]+(\S.*)")

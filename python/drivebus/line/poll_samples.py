@@ -6,7 +6,7 @@ The asking is the compiled core's. How one waits for samples is the business of 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, overload
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, cast, overload
 
 from drivebus import _native, checks
 from drivebus.attribute_mapping import Named
@@ -260,18 +260,17 @@ class Batch(Sequence[Sample[Key]], Generic[Key]):
         came: list[Value | None] | None,
         missing: Exception | None,
     ) -> Sample[Key]:
-        target, values = self._targets[index], None
+        target = self._targets[index]
         error = missing if isinstance(missing, DrivebusError) else None
-        if came is not None and target.plan is None:
-            values = [word for word in came if word is not None]
-        elif came is not None and target.plan is not None:
+        if came is not None and target.plan is not None:
             try:
-                values = target.plan.named(came, unit=target.unit)
+                target.plan.named(came, unit=target.unit)
             except BadAnswer as absent:
-                error = absent
+                came, error = None, absent
         if isinstance(error, Refused) and target.profile is not None:
             error.name, error.meaning = target.profile.exception(error.code)
-        return Sample(target, time, answered, late, values, error)
+        # None of them is None here.
+        return Sample(target, time, answered, late, cast("list[Value] | None", came), error)
 
 
 class Polling(Generic[Key]):

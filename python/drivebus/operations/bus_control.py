@@ -83,6 +83,7 @@ def _not_prepared(unit: DriveView, kind: str, told: Any, *, store: bool) -> Driv
     if kind == "may_not":
         what = f"setting {item.code} ({item.label}) of {unit.profile.title} to {int(item.wanted)}"
         return not_verified(what, item.note, unit.address)
+    by_name = (f". If {int(item.wanted)} is meant, ", call("write"), f" {item.code} first, with ")
     return NotReady(
         Text(
             f"{item.code} of unit {unit.address} is {int(item.actual or 0)}, and must be {int(item.wanted)} "
@@ -90,8 +91,7 @@ def _not_prepared(unit: DriveView, kind: str, told: Any, *, store: bool) -> Driv
             call("prepare_control"),
             f" does not set it: {item.note} Nothing was written",
             # A word of which only some bits count has others that are somebody else's.
-            *(() if told[-1] else (f". If {int(item.wanted)} is meant, ", call("write"), f" {item.code} first, with ")),
-            *(() if told[-1] else (argument("store", True),)),
+            *(() if told[-1] else (*by_name, argument("store", True))),
         ),
         why="settings",
         unit=unit.address,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from drivebus import _native
 from drivebus.errors import BadAnswer
@@ -55,14 +55,13 @@ class ReadPlan:
         """
         return self.named(self.native.values(answers), unit=unit)
 
-    def named(self, values: Sequence[Value | None], *, unit: int | None = None) -> list[Value]:
-        """*values*, with a `Choice` for each that the profile has a label for.
+    def named(self, values: list[Value | None], *, unit: int | None = None) -> list[Value]:
+        """*values*, with a `Choice` for each that the profile has a label for; the list itself is changed.
 
         Raises:
             BadAnswer: One is None: *unit* says that it has no such register.
         """
-        told = [value for value in values if value is not None]
-        if len(told) < len(values):
+        if None in values:
             absent = ", ".join(name for name, value in zip(self.names, values, strict=True) if value is None)
             who = "the drive" if unit is None else f"unit {unit}"
             raise BadAnswer(
@@ -70,6 +69,7 @@ class ReadPlan:
                 f"Leave {absent} out",
                 unit=unit,
             )
+        told = cast("list[Value]", values)
         for index, labels in self._labels:
             value = told[index]
             # A float is never a choice, although one may equal its number.

@@ -217,9 +217,9 @@ def _ask(context: click.Context, session: Session, folder: Path, ask: Callable[[
     except click.Abort:
         remark()
         raise Declined("Cancelled. Nothing was written.") from None
-    told = [*answers.table.left_out]
+    told = len(answers.table.left_out)
     written = profile_template.files_of_answers(folder.resolve().name, answers)
-    for line, why in answers.table.left_out[len(told) :]:
+    for line, why in answers.table.left_out[told:]:
         remark(f"line {line} is left out: {why}")
     _write(folder, written)
     session.out.say(f"{folder}: {', '.join(written)}")
