@@ -70,8 +70,7 @@ class Session:
 
     def load(self, name: str, *words: str) -> int:
         """Loads `drivebus … hal …`, waits until it is ready, and returns its process."""
-        self.type(f"loadusr -Wn {name} {self._linuxcnc.command(*words, '--name', name)}")
-        self.until(lambda: self.process(name) and "ready" in self._row(name))
+        self._load_program(name, self._linuxcnc.command(*words, "--name", name))
         return self.process(name)
 
     def has(self, program: str) -> bool:
@@ -81,8 +80,26 @@ class Session:
     def load_other(self, name: str, line: str) -> None:
         """Loads somebody else's program by its *line*, and waits until it is ready."""
         self._loaded.add(name)
-        self.type(f"loadusr -Wn {name} {line}")
-        self.until(lambda: self.process(name) and "ready" in self._row(name))
+        self._load_program(name, line)
+
+    def _load_program(self, name: str, line: str) -> None:
+        """Loads a program by its *line*, and waits until it is ready.
+
+        While another halcmd ends, the prompt's own child may not get at HAL's memory.
+        It says so, and has begun nothing: then the line is typed once more.
+        """
+        typed = 0
+
+        def is_ready() -> bool:
+            nonlocal typed
+            lost = self.log.read_text().count("hal_init() failed after fork") - before
+            while typed <= lost:
+                typed += 1
+                self.type(f"loadusr -Wn {name} {line}")
+            return bool(self.process(name)) and "ready" in self._row(name)
+
+        before = self.log.read_text().count("hal_init() failed after fork")
+        self.until(is_ready)
 
     def unload(self, name: str) -> None:
         """Ends a program, and waits until it has gone."""
