@@ -79,6 +79,17 @@ class TestLooking:
         [row] = rows(run("--json", "read", name))
         assert (row["name"], row["value"]) == ("P00.03", 50.0)
 
+    def test_what_a_parameter_decides_is_read_in_its_unit(self) -> None:
+        """Of an FC 51, 4000H is what 3-03 says, 50 Hz: 30 Hz are 9830 counts of 16384, and those 29.9988 Hz."""
+        with drivebus.Simulator({1: "fc51"}, transport="tcp" if os.name == "nt" else "pty") as simulator:
+            named = ("--profile", "fc51", "--unverified")
+            with drivebus.Bus(simulator.port) as bus:
+                bus.drive(1, "fc51", unverified=True).setpoint = 30
+            [row] = rows(run(*named, "--json", "read", "bus_reference", port=simulator.port))
+            assert (row["value"], row["unit"]) == (29.999, "Hz")
+            said = run(*named, "read", "bus_reference", port=simulator.port).stdout.splitlines()[1]
+            assert said.split()[:3] == ["bus_reference", "29.999", "Hz"]
+
     @pytest.mark.skipif(sys.platform == "win32", reason="over TCP a new line is asked more than once in any case")
     def test_read_can_ask_twice(self, pty: drivebus.Simulator) -> None:
         asked = []

@@ -278,8 +278,12 @@ def _read(drive: drivebus.Drive, place: str | int, row: Reading, verify: bool) -
         row.label += f", raw {word:#06x}"
         row.value, row.text = word, str(word)
         return
-    row.value = value = drive.read(place, verify=verify)
-    row.text = drive.describe(place).text(value)
+    came = drive.snapshot(place, verify=verify)
+    row.value = value = came[place]
+    row.unit = came.units[place]
+    known = drive.describe(place)
+    # What one count is, the profile says alone of what no parameter of the drive decides.
+    row.text = known.text(value) if known.variant is None else f"{value:.6g}"
     row.bits = drive.profile.fields(place, int(value))
 
 
