@@ -501,3 +501,44 @@ def test_what_a_table_has_beside_a_register_is_held_against_the_answers(there: P
     willed = there.with_name("willed")
     assert asked(willed, [*BY_WORDS[:place], "21", "y", *BY_WORDS[place + 1 :]]).exit_code == 0
     assert drivebus.Profile.load(willed).commands()["run_forward"] == 21
+
+
+WHOLE = """\
+Addr.  Description        Unit  Modif.
+3000H  Command                  W
+3010H  DC bus voltage     V     R
+3011H  Heat sink          °C    R
+"""
+
+
+@pytest.mark.parametrize(("said", "scale"), [("y", 1), ("n", 1), ("", 1)])
+def test_a_unit_without_a_step_is_asked_for(there: Path, said: str, scale: int) -> None:
+    start = ["Arden A1", "A1 manual", "-", *WHOLE.splitlines(), ".", "3", said, ""]
+    done = asked(there, [*start, "Command", "3", "1", "", "0", "", "", "y", *[""] * 20])
+    assert done.exit_code == 0, done.output
+    question = "No step is printed of dc_bus_voltage in V, heat_sink in °C. Is one count of each 1?"
+    assert question in " ".join(done.stderr.split())
+    row = drivebus.Profile.load(there).describe("dc_bus_voltage")
+    assert (row.unit, row.scale, row.access) == ("V" if said == "y" else "raw", scale, "ro")
+
+
+def test_a_range_that_is_answered_takes_nothing_else_out_of_the_note(there: Path) -> None:
+    table = "Code  Addr.  Name    Unit   Range       Change\nP1.00  0100H  Source  codes  see page 9  stopped"
+    start = ["Arden A1", "A1 manual", "-", *table.splitlines(), ".", "3", ""]
+    done = asked(there, [*start, *[""] * 5, "P1.00=2", "0 3", *[""] * 20])
+    assert done.exit_code == 0, done.output
+    row = drivebus.Profile.load(there).describe("P1.00")
+    assert (row.low, row.high, row.note) == (0.0, 3.0, "the table has 'codes' as its unit")
+
+
+def test_enter_where_an_answer_is_needed_says_so(there: Path) -> None:
+    place = BY_HAND.index("5 400")
+    done = asked(there, [*BY_HAND[:place], "", *BY_HAND[place:]])
+    assert (done.exit_code, "this is needed" in done.stderr) == (0, True), done.output
+
+
+def test_a_parameter_is_named_by_its_label(there: Path) -> None:
+    place = BY_TABLES.index("P00.01=2")
+    answers = [*BY_TABLES[:place], "command source=2", *BY_TABLES[place + 1 :]]
+    assert asked(there, answers).exit_code == 0
+    assert [(each.code, each.value) for each in drivebus.Profile.load(there).control()] == [("P00.01", 2)]

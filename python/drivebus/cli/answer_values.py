@@ -17,7 +17,6 @@ __all__ = [
     "command_word",
     "faults",
     "functions",
-    "hertz",
     "line",
     "new",
     "place",

@@ -51,6 +51,8 @@ class Dialogue:
             return self._taken(self._given[self._place], read)
 
         def heard(said: str) -> T:
+            if default is None and not said.strip():
+                raise WrongUse("this is needed")
             if said.strip().lower() == _BACK:
                 if not self._given:
                     raise WrongUse("this is the first question")
@@ -64,7 +66,9 @@ class Dialogue:
                 self._place = before
                 raise
 
-        answer: T = click.prompt(question, default=default, show_default=bool(default), value_proc=heard, err=True)
+        answer: T = click.prompt(
+            question, default=default or "", show_default=bool(default), value_proc=heard, err=True
+        )
         return answer
 
     def optional(self, question: str, read: Callable[[str], T]) -> T | None:

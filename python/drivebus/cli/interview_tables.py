@@ -69,9 +69,10 @@ class TableQuestions:
         if self.table.unused:
             self._dialogue.say(f"Nothing is taken from the columns {', '.join(map(repr, self.table.unused))}.")
         self._take_decimals(rows)
+        self._take_units(rows)
         for row in rows:
-            if row.notes:
-                self._dialogue.say(f"line {row.line}, {row.code or row.name}, goes into a note: {'; '.join(row.notes)}")
+            if row.note:
+                self._dialogue.say(f"line {row.line}, {row.code or row.name}, goes into a note: {row.note}")
         registers, parameters = [row for row in rows if not row.code], [row for row in rows if row.code]
         for kind, found in (("Registers", registers), ("Parameters", parameters)):
             if found:
@@ -103,6 +104,16 @@ class TableQuestions:
         if self._dialogue.agreed(f"Is one count the last decimal that a range has ({first})?", default=False):
             for row in printed:
                 row.by_decimals()
+
+    def _take_units(self, rows: list[TableRow]) -> None:
+        """The steps of rows that have a unit and none, if each counts whole ones."""
+        whole = [row for row in rows if row.unit and row.scale is None and not row.untaken]
+        if not whole:
+            return
+        first = ", ".join(f"{row.code or row.name} in {row.unit}" for row in whole)
+        if self._dialogue.agreed(f"No step is printed of {first}. Is one count of each 1?", default=False):
+            for row in whole:
+                row.scale = 1
 
 
 def content(dialogue: Dialogue, text: str) -> str:

@@ -83,6 +83,7 @@ class TableRow:
         default: As it is printed, or empty.
         choices: What the values of a parameter mean.
         notes: What was not taken over.
+        untaken: A range that was not, as it is printed.
         source: Where it is printed: document and page.
         variant: Which variant of the profile has its unit and scale, or empty.
     """
@@ -101,15 +102,26 @@ class TableRow:
     default: str = ""
     choices: dict[int, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    untaken: str = ""
     source: str = ""
     variant: str = ""
     high_from: str = ""
     signed: bool = False
     printed: Printed | None = None
 
+    @property
+    def note(self) -> str:
+        """What was not taken over, as the profile says it."""
+        return "; ".join([*self.notes, *([f"the table has the range {self.untaken}"] if self.untaken else [])])
+
+    def take_range(self, low: str, high: str) -> None:
+        """What it may be, whatever its table has."""
+        self.low, self.high, self.high_from = low, high, ""
+        self.untaken, self.printed = "", None
+
     def without_range(self) -> None:
         """Leaves the range to the note: it does not fit the step."""
-        self.notes.append(f"the table has the range {self.low} to {self.high or self.high_from}")
+        self.untaken = f"{self.low} to {self.high or self.high_from}"
         self.low = self.high = self.high_from = ""
 
     def by_decimals(self) -> None:
@@ -124,9 +136,8 @@ class TableRow:
     def take_printed(self) -> None:
         """Takes the range that is printed, now that the step is known."""
         if self.printed is not None:
-            self.low, self.high, _, self.default = self.printed
-            self.printed = None
-            self.notes = [note for note in self.notes if not note.startswith("the table has the range ")]
+            low, high, _, self.default = self.printed
+            self.take_range(low, high)
 
 
 class UnclearAddresses(WrongUse):
@@ -229,7 +240,7 @@ def take_range(row: TableRow, cells: dict[str, str]) -> None:
     elif up_to is not None and row.scale is not None:
         row.low, row.high_from = up_to["low"], up_to["code"]
     elif said:
-        row.notes.append(f"the table has the range {said}")
+        row.untaken = said
         if found is not None:
             row.printed = Printed(found["low"], found["high"], _unit(found["unit"]), default_of(cells))
 

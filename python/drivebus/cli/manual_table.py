@@ -44,7 +44,7 @@ _TITLES = {
     r"|fact\.?|ex[ -]?works",
     "low": r"min(\.|imum)?|low",
     "high": r"max(\.|imum)?|high",
-    "access": r"r/?w|read/write|access|acc\.?|attributes?|property|change(s|d|able)?( .*)?|modif(y|ication)( .*)?",
+    "access": r"r/?w|read/write|access|acc\.?|attributes?|property|change(s|d|able)?( .*)?|modif(\.|y|ication)?( .*)?",
 }
 _ACCESS = {
     "ro": r"r|ro|read( ?only)?|r only",
@@ -118,6 +118,17 @@ class ManualTable:
                 self.rows.append(self._row(line, place, row, source))
         return self.rows[before:]
 
+    def called(self, text: str) -> TableRow | None:
+        """The row of which *text* is the code, the name or the label; None where several have that label, or none."""
+        called = " ".join(text.lower().split())
+        own = next((row for row in self.rows if called in {row.code.lower(), row.name}), None) if called else None
+        labelled = [row for row in self.rows if row.label.lower() == called]
+        return own or (labelled[0] if len(labelled) == 1 else None)
+
+    def at(self, address: int, table: str = "holding") -> TableRow | None:
+        """The row at *address*."""
+        return next((row for row in self.rows if (row.table, row.address) == (table, address)), None)
+
     def add(self, address: int, label: str, source: str) -> TableRow:
         """Adds a holding register that no table has."""
         row = TableRow(0, address, "holding", self._name(label), label, source=source)
@@ -189,7 +200,7 @@ class ManualTable:
             scale = "" if row.scale is None else str(row.scale)
             at = f"0x{row.address:04X}"
             facts = [row.name, row.label, row.unit, scale, signed, row.low]
-            proof = ["yes", "; ".join(row.notes), row.source]
+            proof = ["yes", row.note, row.source]
             if row.code:
                 choices = ";".join(f"{number}={label}" for number, label in row.choices.items())
                 parameters.append(

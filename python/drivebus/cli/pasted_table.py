@@ -69,7 +69,10 @@ def _between_gaps(lines: list[str]) -> list[list[str]]:
 
 
 def _divided(found: list[tuple[int, str]], starts: list[int]) -> list[str]:
-    """The texts of a line; one that leaves a cell too few is divided where a word stands below a title."""
+    """The cells of a line; of one that leaves some too few, a text is divided where a word stands below a title.
+
+    Where each text begins below a title, the cells between them are empty.
+    """
     cells: list[str] = []
     lacking = len(starts) - len(found)
     for start, text in found:
@@ -77,4 +80,8 @@ def _divided(found: list[tuple[int, str]], starts: list[int]) -> list[str]:
         cuts = cuts[:lacking] if lacking > 0 else []
         lacking -= len(cuts)
         cells += [text[one:other].strip() for one, other in zip([0, *cuts], [*cuts, len(text)], strict=True)]
+    below = [next((place for place, begin in enumerate(starts) if abs(begin - start) <= 1), None) for start, _ in found]
+    if len(cells) == len(found) < len(starts) and None not in below:
+        by_place = dict(zip(below, cells, strict=True))
+        return [by_place.get(place, "") for place in range(len(starts))]
     return cells

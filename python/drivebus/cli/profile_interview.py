@@ -91,7 +91,7 @@ class _Interview:
                 answers.setpoint = None
         answers.state = self._state()
         answers.frequency = self._register("Register that tells the output frequency", "Output frequency", "ro", {"Hz"})
-        if answers.frequency is not None and not self._is_in_hertz(answers.frequency):
+        if answers.frequency is not None and not self._counts(answers.frequency, "Hz", "it"):
             answers.frequency = None
         answers.fault = self._register("Register that tells the number of a fault", "Fault", "ro", set())
         if answers.fault is not None and answers.fault.scale is None:
@@ -175,14 +175,11 @@ class _Interview:
         counts, of = said
         whole = "100 % is the parameter, such as P00.03"
         code = self._parameter(of) if of else self._dialogue.needed(whole, self._parameter)
-        if code.scale is None or code.unit != "Hz":
-            code.unit = "Hz"
-            code.scale = int(1 / self._dialogue.needed(f"One count of {code.code} is, such as 0.01 Hz", values.hertz))
-            code.take_printed()
+        if not self._counts(code, "Hz", code.code):
+            return None
         if not (code.low and code.high):
             ends = f"{code.code} may be from and to, in Hz, such as 10 400"
-            low, high = self._dialogue.needed(ends, values.two_numbers)
-            code.low, code.high = f"{low:g}", f"{high:g}"
+            code.take_range(*(f"{end:g}" for end in self._dialogue.needed(ends, values.two_numbers)))
         low, high = float(code.low), float(code.high)
         if row.low or row.high:
             row.without_range()
@@ -215,12 +212,6 @@ class _Interview:
         if not self._dialogue.agreed(f"{told[:1].upper()}{told[1:]}. Is it {text} all the same?", default=False):
             raise WrongUse(f"{text} is not what the table says")
 
-    def _is_in_hertz(self, row: TableRow) -> bool:
-        if row.unit != "Hz" or row.scale is None:
-            step = self._dialogue.optional("One count of it is, such as 0.01 Hz", values.hertz)
-            row.unit, row.scale = ("Hz", int(1 / step)) if step is not None else (row.unit, row.scale)
-        return row.unit == "Hz" and row.scale is not None
-
     def _control(self) -> Iterator[Setting]:
         question = "Parameter that must be set so that the bus gives commands, or the speed: P00.01=2 (Enter: no more)"
         while (found := self._dialogue.optional(question, self._setting)) is not None:
@@ -231,8 +222,7 @@ class _Interview:
                 ends = f"{row.code} may be from and to, such as 0 3 (Enter: not printed; then it is set by hand)"
                 between = self._dialogue.optional(ends, values.two_numbers)
                 if between is not None:
-                    row.low, row.high = (f"{end:g}" for end in between)
-                    row.notes.clear()
+                    row.take_range(*(f"{end:g}" for end in between))
             yield Setting(row.code, value, row.label, row.source)
 
     def _setting(self, text: str) -> tuple[TableRow, int]:
@@ -255,7 +245,7 @@ class _Interview:
         if time is None:
             return None
         start = self._dialogue.optional("Parameter with the frequency which that time begins from", self._parameter)
-        if start is None or not (self._counts(time, "s") and self._counts(start, "Hz")):
+        if start is None or not (self._counts(time, "s", time.code) and self._counts(start, "Hz", start.code)):
             self._dialogue.say("Then a stop waits for standstill, however long that is.")
             return None
         return Ramp(time.code, start.code)
@@ -265,7 +255,7 @@ class _Interview:
         timeout = self._dialogue.optional(
             "Parameter with the time after which it acts on a silent bus", self._parameter
         )
-        if timeout is None or not self._counts(timeout, "s"):
+        if timeout is None or not self._counts(timeout, "s", timeout.code):
             return None
         action = self._dialogue.optional("Parameter that says what it does then", self._parameter)
         if action is None:
@@ -278,12 +268,12 @@ class _Interview:
                 known[what] = word
         return Watchdog(timeout.code, action.code, known, timeout.source)
 
-    def _counts(self, row: TableRow, unit: str) -> bool:
+    def _counts(self, row: TableRow, unit: str, called: str) -> bool:
         """Whether it is known how many counts of *row* one *unit* has, or it is said now."""
         if row.unit != unit or row.scale is None:
-            step = self._dialogue.optional(
-                f"One count of {row.code} is, such as 0.1 {unit}", lambda text: values.step(text, unit)
-            )
+            such = "0.1 s" if unit == "s" else f"0.01 {unit}"
+            question = f"One count of {called} is, such as {such}"
+            step = self._dialogue.optional(question, lambda text: values.step(text, unit))
             if step is None:
                 return False
             row.unit, row.scale = unit, int(1 / step)
@@ -323,10 +313,9 @@ class _Interview:
 
     def _parameter(self, text: str) -> TableRow:
         """A parameter by its code, or by the name or the address of its row."""
-        called = text.lower()
-        row = next((row for row in self.table.rows if called in {row.code.lower() or None, row.name}), None)
-        if row is None and re.fullmatch(_ADDRESS, called):
-            row = self._at(values.place(text)[1])
+        row = self.table.called(text)
+        if row is None and re.fullmatch(_ADDRESS, text.lower()):
+            row = self.table.at(values.place(text)[1])
             if row is None:
                 raise WrongUse(f"no table has {text}; say its code, as the keypad shows it")
         if row is not None:
@@ -338,7 +327,7 @@ class _Interview:
         found = self._dialogue.optional(question, values.place)
         if found is None or found[0] != "holding":
             raise WrongUse(f"{code} needs the address of a holding register")
-        row = self._at(found[1]) or self.table.add(found[1], code, self._pages.source())
+        row = self.table.at(found[1]) or self.table.add(found[1], code, self._pages.source())
         row.code = row.code or code
         return row
 
@@ -363,21 +352,14 @@ class _Interview:
         return found
 
     def _known_or_place(self, text: str) -> TableRow | int:
-        called = " ".join(text.lower().split())
-        names = [{row.name, row.label.lower(), row.code.lower() or None} for row in self.table.rows]
-        found = [row for row, known in zip(self.table.rows, names, strict=True) if called in known]
-        # Several may have the same label.
-        row = found[0] if len(found) == 1 else next((row for row in found if called == row.name), None)
+        row = self.table.called(text)
         if row is not None:
             return row
         table, address = values.place(text)
-        row = next((row for row in self.table.rows if (row.table, row.address) == (table, address)), None)
+        row = self.table.at(address, table)
         if row is None and table != "holding":
             raise WrongUse(f'no table has "{text}", which is an input register')
         return address if row is None else row
-
-    def _at(self, address: int) -> TableRow | None:
-        return next((row for row in self.table.rows if (row.table, row.address) == ("holding", address)), None)
 
     def _reset(self, text: str, register: TableRow, words: Mapping[str, int]) -> tuple[TableRow, int]:
         """A word that means one thing only to *register*, or another register and its word."""
@@ -386,7 +368,7 @@ class _Interview:
         if address == register.address:
             return register, values.new(words, values.command_word)(said)
         word = values.command_word(said)
-        row = self._at(address) or self.table.add(address, "Fault reset", self._pages.source())
+        row = self.table.at(address) or self.table.add(address, "Fault reset", self._pages.source())
         _allow(row, "wo")
         _widen(row, [word])
         return row, word
