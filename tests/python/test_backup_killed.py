@@ -96,21 +96,28 @@ def test_cut_off_at_fifty_moments_and_more(dies_at: DiesAt) -> None:
 
 
 CHILD = f"""
-import os, sys
+import os, signal, sys, traceback
 from drivebus import Bus
 
 path, what = sys.argv[1:]
 for port in map(str.strip, sys.stdin):
     child = os.fork()
     if child == 0:
-        with Bus(port, baudrate={BAUD}, silence={SILENCE}) as bus:
-            getattr(bus.drive(1, "gd350"), what)(path)
+        try:
+            with Bus(port, baudrate={BAUD}, silence={SILENCE}) as bus:
+                getattr(bus.drive(1, "gd350"), what)(path)
+        except BaseException:
+            traceback.print_exc()
+            signal.pause()
         os._exit(0)
     print(child, flush=True)
     _, status = os.waitpid(child, 0)
     print(status, flush=True)
 """
-"""For each port it is told, a process of its own does it; forked, for to start one takes long."""
+"""For each port it is told, a process of its own does it; forked, for to start one takes long.
+
+One that gives up, as nobody answers, waits to be killed: on a busy machine that comes late.
+"""
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no pty, and no kill -9")
@@ -172,8 +179,8 @@ def children(path: Path, what: str) -> Iterator[subprocess.Popen[str]]:
 def killed(parent: subprocess.Popen[str], simulator: Simulator, requests: int) -> int:
     """How a process ended that was killed after *requests* on the line.
 
-    From then on the drive does what it is told and its answers are lost, so that nothing ends before it is killed,
-    however late that is.
+    From then on the drive does what it is told and its answers are lost, so that no process is done before it is
+    killed, however late that is.
     """
     assert parent.stdin is not None
     assert parent.stdout is not None
