@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use crate::decimal::{Counts, Decimal};
 use crate::scale::Scale;
 use crate::text::{closest, parse_address};
-use crate::value::{Input, Limits, Value, ValueError};
+use crate::value::{Input, Limits, Value, ValueError, to_word};
 
 /// What a word means: counts of a [`unit`](Self::unit), within a range, or one of some choices.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -248,10 +248,4 @@ pub(crate) fn limits(signed: bool, wide: bool) -> (i64, i64) {
         (true, true) => (i64::from(i32::MIN), i64::from(i32::MAX)),
         (false, true) => (0, i64::from(u32::MAX)),
     }
-}
-
-/// The low word of `count`, in two's complement.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low 16 bits are the word")]
-pub(crate) fn to_word(count: i64) -> u16 {
-    count as u16
 }

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use crate::quantity::to_word;
 use crate::scale::Scale;
 
 /// A value as a decimal number, and the counts that it is. `Display` prints every decimal: `10.00`.
@@ -37,6 +36,12 @@ impl Value {
         let digits = self.scale.digits(self.count) as f64;
         digits / f64::from(10_u32.pow(u32::from(self.scale.decimals())))
     }
+}
+
+/// The low word of `count`, in two's complement.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the low 16 bits are the word")]
+pub(crate) fn to_word(count: i64) -> u16 {
+    count as u16
 }
 
 impl fmt::Display for Value {

@@ -11,9 +11,10 @@ use crate::entry::{Access, Entry, Kind};
 use crate::evidence::Evidence;
 use crate::parts::fault::Fault;
 use crate::place::Place;
-use crate::quantity::{Quantity, limits, to_word};
+use crate::quantity::{Quantity, limits};
 use crate::scale::Scale;
 use crate::text::{parameter_address, parse_address, parse_code};
+use crate::value::to_word;
 
 /// An item and the line it came from.
 pub(super) struct Located<T> {
