@@ -9,12 +9,13 @@ from pathlib import Path
 import click
 
 import drivebus
-from drivebus.cli import profile_interview, profile_template
+from drivebus.cli import own_signature, profile_interview, profile_template
 from drivebus.cli.halts_elsewhere import started_by
 from drivebus.cli.manual_cells import COUNTS
 from drivebus.cli.manual_table import ManualTable
 from drivebus.cli.names import complete_profile
 from drivebus.cli.option_types import Place
+from drivebus.cli.own_signature import OwnSignature
 from drivebus.cli.present.families import KINDS, Families, FamilyRules, Mistakes
 from drivebus.cli.present.help_format import Listing
 from drivebus.cli.present.output import remark
@@ -59,7 +60,7 @@ def check(context: click.Context, session: Session, folder: Path, read: bool) ->
     _check(context, session, folder, read=read)
 
 
-def _check(context: click.Context, session: Session, folder: Path, *, read: bool) -> None:
+def _check(context: click.Context, session: Session, folder: Path, *, read: bool, is_new: bool = False) -> None:
     problems = drivebus.Profile.check(folder)
     session.out.render(Mistakes(problems))
     if problems:
@@ -73,14 +74,16 @@ def _check(context: click.Context, session: Session, folder: Path, *, read: bool
     rows = ", ".join(f"{total} {kind if total != 1 else kind.removesuffix('s')}" for kind, total in totals.items())
     session.out.say(f"{folder} is sound: {rows}.")
     _say_what_is_missing(profile)
-    if read and not _compare(session, profile):
+    if read and not _compare(session, folder, profile, is_new=is_new):
         context.exit(4)
 
 
-def _compare(session: Session, profile: drivebus.Profile) -> bool:
-    """Shows what the drive has in each row. Whether it refused none."""
+def _compare(session: Session, folder: Path, profile: drivebus.Profile, *, is_new: bool) -> bool:
+    """Shows what the drive has in each row, and by what it is told from others. Whether it refused none."""
     with session.bus() as bus:
         reads = list(read_rows(bus.drive(session.unit, profile=profile, unverified=True)))
+        is_told = profile.signature() is not None or profile.role("identification") is not None
+        signature = None if is_told else own_signature.find(bus, session.unit, profile)
     session.out.rows(["name", "place", "value", "unit", "label"], [each[:5] for each in reads], spare=["label"])
     refused = [each.name for each in reads if not each.is_there]
     if refused:
@@ -88,7 +91,23 @@ def _compare(session: Session, profile: drivebus.Profile) -> bool:
             f"Error: {session.called} refuses {', '.join(refused)}: it has nothing there, or the address is one off. "
             "Some manuals count addresses from 1"
         )
+    if signature is not None:
+        _tell_apart(folder, signature, adds=is_new and not refused)
     return not refused
+
+
+def _tell_apart(folder: Path, signature: OwnSignature, *, adds: bool) -> None:
+    """Says by what the drive is told from others, or *adds* it to its profile."""
+    rules = folder / "profile.toml"
+    what = "what this drive answers and refuses, so that no other is taken for it"
+    if adds:
+        with rules.open("a", encoding="utf-8", newline="\n") as file:
+            file.write(f"\n{signature.rules()}")
+        remark(f"{rules} has {what}.")
+    else:
+        remark(f"Note: {rules} has nothing of {what}. Once its rows are right, this is it:\n{signature.rules()}")
+    if signature.not_told:
+        remark(f"By that it is not told from {', '.join(signature.not_told)}.")
 
 
 def _say_what_is_missing(profile: drivebus.Profile) -> None:
@@ -223,7 +242,7 @@ def _ask(context: click.Context, session: Session, folder: Path, ask: Callable[[
         remark(f"line {line} is left out: {why}")
     _write(folder, written)
     session.out.say(f"{folder}: {', '.join(written)}")
-    _check(context, session, folder, read=is_there)
+    _check(context, session, folder, read=is_there, is_new=True)
     session.out.say(f"Try it on a simulated drive: drivebus sim --units 1={folder}")
 
 
