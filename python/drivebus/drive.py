@@ -257,9 +257,10 @@ class Drive(BlockingFormerNames):
         Args:
             timeout: Seconds, in the range and steps of the drive's parameter (GD350: 0.1 to 60.0, in tenths). Longer
                 than the bus's own time-out, or one lost answer is enough.
-            action: `"coast"` takes the voltage off the motor and trips a fault (GD350: CE), whoever is in control;
-                `"stop"` stops it as the drive is set to, without a fault. `"trip"` is all that a VFD500 can: it trips
-                Er.485, and its own settings decide what that does to the motor, which may keep running.
+            action: `"coast"` takes the voltage off the motor, whoever is in control, and trips a fault (GD350: CE) if
+                the drive has no trip beside it; `"stop"` stops it as the drive is set to, without a fault. `"trip"` is
+                all that a VFD500 can: it trips Er.485, and its own settings decide what that does to the motor, which
+                may keep running.
             unverified: Also where the parameters are not verified for the family, as they are not for the GD350.
 
         Raises:

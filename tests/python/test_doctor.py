@@ -79,14 +79,18 @@ class TestASoundLine:
             (
                 "gd350",
                 {"P14.05": 1, "P14.04": 2.0},
-                "trips nothing when the bus is silent for 2 s (P14.04): P14.05 is keep running",
+                "what it does when the bus is silent for 2 s (P14.04), this alone tells: P14.05 is keep running",
             ),
             (
                 "gd350",
                 {"P14.05": 3, "P14.04": 2.0},
-                "trips nothing when the bus is silent for 2 s (P14.04): P14.05 is stop silently",
+                "it stops, and trips nothing, when the bus is silent for 2 s (P14.04): P14.05 is stop silently",
             ),
-            ("gd3000-rectifier", {"P11.05": 1, "P11.04": 2.0}, "trips nothing when the bus is silent for 2 s (P11.04)"),
+            (
+                "gd3000-rectifier",
+                {"P11.05": 1, "P11.04": 2.0},
+                "what it does when the bus is silent for 2 s (P11.04), this alone tells",
+            ),
             (
                 "vfd500",
                 {"P30.05": 2.0},

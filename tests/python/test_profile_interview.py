@@ -373,7 +373,7 @@ AS_PRINTED = [
     *("-", *SETTINGS.splitlines(), ".", "8", "y", ""),
     *("control_word", "6", "bit 0 and bit 2", "bits 0, 1, 2", "bit 2", "0", "bits 2 7", "y"),
     *("speed_reference", "status_word", "", "bits", "3=1", "1=1,2=0", "1=1,2=1", "1=0"),
-    *("output_frequency", "active_fault", "1-01=2", "1-02=3", "", "3-02", "3-05", "7-01", "7-02", "1", ""),
+    *("output_frequency", "active_fault", "1-01=2", "1-02=3", "", "3-02", "3-05", "7-01", "7-02", "1", "", "2", "9"),
     *("-", *LIST_OF_FAULTS.splitlines(), ".", "11", "6, 16", "16", "4", "19200 8N1 5", "4"),
 ]
 """A manual whose tables are pasted as it prints them: lines that go on, values without signs, a gap of one blank."""
@@ -405,7 +405,7 @@ def test_a_table_is_pasted_as_it_is_printed(there: Path) -> None:
     assert profile.describe("3-05").default == 60.0
     text = (there / "profile.toml").read_text(encoding="utf-8")
     assert '[ramp]\ndeceleration = "3-02"\nstart = "3-05"' in text
-    assert '[watchdog]\ntimeout = "7-01"\naction = "7-02"\nstop = 1' in text
+    assert '[watchdog]\ntimeout = "7-01"\naction = "7-02"\nstop = 1\ntrip = 2\nfault = 9' in text
     assert [(profile.fault(code).mnemonic, profile.fault(code).label) for code in (1, 5, 9)] == [
         ("E.OC", "overcurrent"),
         ("E.OH", "heat sink too hot"),
@@ -504,7 +504,7 @@ BY_WORDS = [
     *("-", *IN_GAPS.splitlines(), ".", "62", "y", ""),
     *("Command", "", "0021H", "0022H", "0010H", "", "0080H", "y"),
     *("Setpoint", "10000 = F1.04", "63", "State", "", "number", "1", "2", "0", "7"),
-    *("Output frequency", "Fault number", "F1.01=serial", "", "", "F4.20", "", "F4.20"),
+    *("Output frequency", "Fault number", "F1.01=serial", "", "", "F4.20", "", "30", "F4.20"),
     *("", "6", "8", "61", "9600 8-N-1 3", "61"),
 ]
 
@@ -579,3 +579,109 @@ def test_a_parameter_is_named_by_its_label(there: Path) -> None:
     answers = [*BY_TABLES[:place], "command source=2", *BY_TABLES[place + 1 :]]
     assert asked(there, answers).exit_code == 0
     assert [(each.code, each.value) for each in drivebus.Profile.load(there).control()] == [("P00.01", 2)]
+
+
+HALDEN = """\
+Register  Name              Meaning                           Unit
+40201     Drive command     Bit 0: start                      -
+                            Bit 1: direction, 1 is backward
+                            Bit 2: enable
+40202     Frequency target  0 to A.012                        0.1 Hz
+40203     Acknowledge       write 1                           -
+30201     Status            Bit 0: ready                      -
+                            Bit 4: motor turns
+                            Bit 5: backward
+                            Bit 7: tripped
+30202     Actual frequency                                    0.1 Hz
+30204     DC link                                             V
+30205     Shaft power       signed                            0.1 kW
+30206     Trip number       see 6
+"""
+HALDEN_SETTINGS = """\
+Id.    Register  Name                Range                Ex works  Edit
+A.001  40501     Control place       0 keys 1 terminals   0         stop
+                                     2 Modbus
+A.011  40511     Ramp down           0.5 ... 120.0 s      5.0       always
+A.012  40512     Upper frequency     25.0 ... 300.0 Hz    50.0      stop
+A.030  40530     Modbus time-out     0.0 ... 30.0 s       0.0       always
+A.031  40531     At time-out         0 trip 14 1 ramp     0         always
+                                     2 coast
+"""
+HALDEN_TRIPS = """\
+6 Trips
+ 3  OI   overcurrent            9  OT   drive too hot
+ 5  OV   DC link too high      14  MB   Modbus time-out
+"""
+ASKED_OF_HALDEN = [
+    *("Halden HX20", "HX20-MB-EN 2.1", "-", *HALDEN.splitlines(), ".", "7", "y"),
+    *("-", *HALDEN_SETTINGS.splitlines(), ".", "10", "y", ""),
+    *("drive_command", "7", "bits 0, 2", "bits 0, 1, 2", "bit 2", "0", "acknowledge=1", "y"),
+    *("frequency_target", "30201", "8", "bits", "7=1", "4=1, 5=0", "4=1, 5=1", "4=0"),
+    *("actual_frequency", "trip_number", "A.001=2", "", "A.011", "A.012", "A.030", "A.031", "1", "2", "0", "14"),
+    *("-", *HALDEN_TRIPS.splitlines(), ".", "12", "6", "12", "5", "19200 8E1 11", "5"),
+]
+
+
+def test_what_a_manual_calls_bits_and_trips_is_kept(there: Path) -> None:
+    done = asked(there, ASKED_OF_HALDEN)
+    assert done.exit_code == 0, done.output
+    assert "drivebus sim --units 11=" in done.stdout
+    assert "Faults: 3 OI overcurrent, 9 OT drive too hot, 5 OV DC link too high, 14 MB Modbus time-out." in done.stderr
+    profile = drivebus.Profile.load(there)
+    assert profile.command("reset_fault") == (202, 1)
+    assert [each.code for each in profile.faults()] == [3, 5, 9, 14]
+    target = profile.describe("frequency_target")
+    assert (target.low, target.high_from) == (0.0, "A.012")
+    power = profile.describe("shaft_power")
+    assert (power.unit, power.scale, power.signed) == ("kW", 10, True)
+    assert {*(profile.describe("status").bits or {})} == {"tripped", "motor_turns", "backward", "ready"}
+    assert profile.watchdog is not None
+    assert (profile.watchdog.actions, profile.watchdog.fault) == ({"stop": 1, "coast": 2, "trip": 0}, 14)
+    with Simulator({11: there}, transport="process", clock="virtual") as line, drivebus.Bus(line) as bus:
+        drive = bus.drive(11, profile=there)
+        drive.prepare_control(store=True)
+        with pytest.raises(drivebus.NotAllowed, match="0 to 50 Hz"):
+            drive.run(60.0)
+        drive.run(12.5)
+        assert drive.status().ready is True
+        for action, state, shown in ((0, "fault", 14), (1, "stopped", 0), (2, "stopped", 0)):
+            drive.write({"A.030": 3.0, "A.031": action}, store=True)
+            drive.run(12.5)
+            drive.wait_for_speed()
+            line.advance(9.0)
+            assert (line.drive(11).state, line.drive(11).fault) == (state, shown), action
+            if shown:
+                drive.reset_fault()
+
+
+@pytest.mark.parametrize(
+    ("before", "wrong", "said"),
+    [
+        ("4=1, 5=0", "7=1, 4=1", "fault is told by 7=1, and so forward would never be"),
+        ("4=1, 5=1", "4=1, 5=0, 0=1", "forward is told by 4=1, 5=0, and so reverse would never be"),
+        ("4=0", "4=1", "a motor that runs forward shows that too (4=1, 5=0)"),
+        ("1", "9", "the table has 0 trip 14, 1 ramp, 2 coast"),
+        ("bits 0, 2", "?", "write 18, 12H or 0x12, or bits 0, 2"),
+    ],
+)
+def test_a_state_that_would_never_be_shown_is_no_answer(there: Path, before: str, wrong: str, said: str) -> None:
+    place = len(ASKED_OF_HALDEN) - 1 - ASKED_OF_HALDEN[::-1].index(before)
+    done = asked(there, [*ASKED_OF_HALDEN[:place], wrong, *ASKED_OF_HALDEN[place:]])
+    assert done.exit_code == 0, done.output
+    assert said in " ".join(done.stderr.split())
+    assert drivebus.Profile.load(there).commands()["run_forward"] == 5
+
+
+@pytest.mark.parametrize(
+    ("before", "wrong", "said"),
+    [
+        ("A.001=2", "A.001=1", "A.001 = 1 is terminals, by its table. Is it what obeys the bus all the same?"),
+        ("1", "2", "A.031 = 2 is coast, by its table. Is it what makes it stop all the same?"),
+    ],
+)
+def test_a_value_that_the_table_calls_otherwise_is_asked_for_once_more(
+    there: Path, before: str, wrong: str, said: str
+) -> None:
+    place = len(ASKED_OF_HALDEN) - 1 - ASKED_OF_HALDEN[::-1].index(before)
+    done = asked(there, [*ASKED_OF_HALDEN[:place], wrong, "n", *ASKED_OF_HALDEN[place:]])
+    assert (done.exit_code, said in " ".join(done.stderr.split())) == (0, True), done.output

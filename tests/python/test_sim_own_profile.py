@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -62,6 +63,28 @@ def test_the_profile_with_every_table_can_be_simulated() -> None:
     ex9 = Profile.load(PROFILES.parent.parent.parent.parent / "tests/vectors/profiles/ex9")
     with drivebus.Simulator({1: ex9}, transport="process", clock="virtual") as simulator:
         assert simulator.drive(1).state == "stopped"
+
+
+@pytest.mark.parametrize(
+    ("action", "state", "fault"), [("coast", "stopped", 0), ("stop", "stopped", 0), ("trip", "fault", 12)]
+)
+def test_a_silent_bus_has_a_trip_beside_a_coast(tmp_path: Path, action: str, state: str, fault: int) -> None:
+    shutil.copytree(PROFILES.parent.parent.parent.parent / "tests/vectors/profiles/ex9", tmp_path / "ex9")
+    rules = tmp_path / "ex9/profile.toml"
+    said = rules.read_text(encoding="utf-8").replace("coast = 0\nstop = 3", "coast = 1\nstop = 3\ntrip = 0\nfault = 12")
+    rules.write_text(said, encoding="utf-8")
+    profile = Profile.load(tmp_path / "ex9")
+    assert profile.watchdog is not None
+    assert profile.watchdog.choices == ("coast", "stop", "trip")
+    with drivebus.Simulator({1: profile}, transport="process", clock="virtual") as line, drivebus.Bus(line) as bus:
+        drive = bus.drive(1, profile, unverified=True)
+        drive.prepare_control()
+        drive.run(hz=20.0)
+        line.advance(10.0)
+        watchdog = drive.watchdog(1.0, action)
+        watchdog.__enter__()
+        line.advance(20.0)
+        assert (line.drive(1).state, line.drive(1).fault) == (state, fault)
 
 
 def test_a_folder_that_is_no_sound_profile_is_refused_as_everywhere(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ const QUESTIONS: u32 = 4;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum OnSilence {
-    /// It takes the voltage off the motor, and trips a fault.
+    /// It takes the voltage off the motor. It trips a fault, too, where the family has no [`Trip`](Self::Trip) beside it.
     Coast,
     /// It stops the motor as it is set to, and trips none.
     Stop,
@@ -58,8 +58,8 @@ impl OnSilence {
 
     fn is_of(self, settings: &Watchdog) -> bool {
         match self {
-            Self::Trip => settings.action.is_none(),
-            Self::Coast | Self::Stop => self.word(settings).is_some(),
+            Self::Trip if settings.action.is_none() => true,
+            Self::Coast | Self::Stop | Self::Trip => self.word(settings).is_some(),
         }
     }
 
@@ -68,7 +68,7 @@ impl OnSilence {
         match self {
             Self::Coast => settings.coast,
             Self::Stop => settings.stop,
-            Self::Trip => None,
+            Self::Trip => settings.trip,
         }
     }
 }

@@ -207,7 +207,7 @@ pub(crate) fn variants<'py>(py: Python<'py>, profile: &Profile) -> Table<'py> {
 
 pub(crate) fn watchdog<'py>(py: Python<'py>, watchdog: &Watchdog) -> Table<'py> {
     let actions = PyDict::new(py);
-    for (name, word) in [("coast", watchdog.coast), ("stop", watchdog.stop)] {
+    for (name, word) in [("coast", watchdog.coast), ("stop", watchdog.stop), ("trip", watchdog.trip)] {
         if let Some(word) = word {
             actions.set_item(name, word)?;
         }

@@ -373,7 +373,9 @@ impl Drive {
         };
         match (action, family.faults.silent_bus) {
             (Some(OnSilence::Trip), Some(code)) => self.trip(code),
-            (Some(OnSilence::Trip), None) => self.machine.command(Command::Coast, &self.settings),
+            (Some(OnSilence::Trip), None) | (Some(OnSilence::Coast), _) => {
+                self.machine.command(Command::Coast, &self.settings);
+            }
             (Some(OnSilence::StopIfObeyed), _) if !self.obeys_bus() => {}
             (Some(OnSilence::StopIfObeyed | OnSilence::Stop), _) => self.machine.command(Command::Stop, &self.settings),
             (None, _) => {}

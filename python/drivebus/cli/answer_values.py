@@ -145,7 +145,10 @@ def line(text: str) -> tuple[int, str, int]:
 def command_word(text: str) -> int:
     """A word, or the bits that are 1 in it: `bit 0 and bit 2`, `bits 0, 2`."""
     if re.fullmatch(r"bits? ?\d{1,2}((,| |\+|&|and)+(bit)? ?\d{1,2})*", text.lower()) is None:
-        return word(text)
+        try:
+            return word(text)
+        except WrongUse as error:
+            raise WrongUse(f"{error}, or bits 0, 2") from None
     numbers = {int(number) for number in re.findall(r"\d+", text)}
     if max(numbers) > 15:
         raise WrongUse(f'"{text}": a word has the bits 0 to 15')
@@ -179,6 +182,10 @@ def faults(text: str) -> list[tuple[int, str, str]]:
         is_code = bool(rest) and _MNEMONIC.fullmatch(first) is not None
         label = rest if is_code else f"{first} {rest}".strip()
         found.setdefault(int(said[1]), (int(said[1]), first if is_code else "", label))
+    codes = [code for _, code, _ in found.values()]
+    if len(codes) > 1 and not codes[0] and all(codes[1:]):
+        # The number of a chapter, with its title.
+        del found[next(iter(found))]
     if not found:
         raise WrongUse("no line of it begins with the number of a fault, such as 1 OC overcurrent")
     return list(found.values())

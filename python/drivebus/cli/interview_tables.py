@@ -67,7 +67,10 @@ class TableQuestions:
         for line, why in sorted(self.table.left_out):
             self._dialogue.say(f"line {line} is left out: {why}")
         if self.table.unused:
-            self._dialogue.say(f"Nothing is taken from the columns {', '.join(map(repr, self.table.unused))}.")
+            self._dialogue.say(
+                f"Nothing is taken from the columns {', '.join(map(repr, self.table.unused))}. If it should be, type "
+                "back, and call them code, name, unit, step, signed, range, choices, default or access."
+            )
         self._take_decimals(rows)
         self._take_units(rows)
         for row in rows:
@@ -76,9 +79,7 @@ class TableQuestions:
         registers, parameters = [row for row in rows if not row.code], [row for row in rows if row.code]
         for kind, found in (("Registers", registers), ("Parameters", parameters)):
             if found:
-                self._dialogue.say(
-                    f"{kind}: {', '.join(f'{row.code or row.name} at {row.address:04X}H' for row in found)}."
-                )
+                self._dialogue.say(f"{kind}: {', '.join(f'{row.code or row.name} at {row.shown}' for row in found)}.")
 
     def _read(self, data: bytes, source: str, count: str | None) -> list[TableRow]:
         """The rows of a table, whose addresses may have to be asked for."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import NamedTuple
 
+from drivebus import tables
 from drivebus.cli.wrong_use import WrongUse
 
 __all__ = [
@@ -37,6 +38,13 @@ _RANGE = re.compile(
     rf"(?: ?[(\[](?:step:? ?)?(?P<step>\d+(?:\.\d+)?) ?(?P<of>{_UNIT})?[)\]])?"
 )
 """`0.1-600.0 s (0.1 s)`: ends, unit and step."""
+_BITS = re.compile(
+    r"\b[Bb]its? ?(?P<first>\d{1,2})(?: ?(?:-|to|\.\.+) ?(?P<last>\d{1,2}))?[:=]? +(?P<label>[A-Za-z][^,;.:=()]*?)"
+    r"(?= ?(?:[,;.:=()']|\b[Bb]its?\b|$))"
+)
+"""`Bit 4: motor turns`, `bits 2-3 mode`: what a bit is called."""
+_SIGNED = re.compile(r"signed|with sign|(16 ?bit,? )?two'?s'? complement", re.IGNORECASE)
+"""There are values below zero."""
 _UP_TO = re.compile(
     rf"(?P<low>{_NUMBER}) ?(?:-|\u2013|~|to|\u2026|\.\.\.?) ?(?P<code>[A-Za-z]{{0,3}}\d{{0,3}}[.-]\d{{1,3}})"
 )
@@ -108,6 +116,23 @@ class TableRow:
     high_from: str = ""
     signed: bool = False
     printed: Printed | None = None
+
+    @property
+    def shown(self) -> str:
+        """Where it is, in words."""
+        return tables.shown(tables.place(self.table, self.address))
+
+    @property
+    def bits(self) -> dict[tuple[int, int], str]:
+        """What its notes call bits: the highest and the lowest one of each, and a name of one word."""
+        found: dict[tuple[int, int], str] = {}
+        for said in _BITS.finditer(" ".join(self.notes)):
+            name = "_".join(re.findall(r"[a-z0-9]+", said["label"].lower())[:3])
+            ends = sorted((int(said["first"]), int(said["last"] or said["first"])), reverse=True)
+            is_new = name not in found.values() and not any(low <= ends[0] and ends[1] <= high for high, low in found)
+            if name[:1].isalpha() and ends[0] <= 15 and is_new:
+                found[ends[0], ends[1]] = name
+        return found
 
     @property
     def note(self) -> str:
@@ -191,14 +216,19 @@ def take_step(row: TableRow, cells: dict[str, str]) -> None:
             # `0.1 %, signed`, `0.1 Hz, 0 ... P00.03`
             first, _, rest = said.partition(",")
             found = _STEP.fullmatch(first.strip()) if first.strip() else None
-            if found is not None and rest.strip() == "signed":
+            if found is not None and _SIGNED.fullmatch(rest.strip()):
                 row.signed = True
             elif found is not None and not cells.get("range") and _ends(rest.strip()):
                 cells["range"] = rest.strip()
             elif found is not None:
                 row.notes.append(f"the table says {rest.strip()!r}")
-        if found is None:
+        if found is None and what == "says" and _SIGNED.fullmatch(said):
+            row.signed = True
+        elif found is None and what == "says" and not cells.get("range") and _ends(said):
+            cells["range"] = said
+        elif found is None:
             row.notes.append(f"the table says {said!r}" if what == "says" else f"the table has {said!r} as its {what}")
+        if found is None:
             continue
         row.unit = row.unit or _unit(found["unit"])
         if found["step"]:

@@ -31,7 +31,7 @@ __all__ = ["ManualTable", "NoAddresses"]
 
 _TITLES = {
     "address": r".*\baddr(ess|\.)?\b.*|register|reg\.?|location",
-    "code": r"(function |parameter |param\.? |par\.? )?(code|no\.?|number|id)|par\.?|pr\.?",
+    "code": r"(function |parameter |param\.? |par\.? )?(code|no\.?|number|id\.?)|par\.?|pr\.?",
     "label": r"(function |parameter |register )?(name|description|definition)|function|meaning|item|designation"
     r"|contents?|parameter|explanation|data",
     "unit": r"units?( ?[/,] ?\w+)?",
@@ -44,7 +44,8 @@ _TITLES = {
     r"|fact\.?|ex[ -]?works",
     "low": r"min(\.|imum)?|low",
     "high": r"max(\.|imum)?|high",
-    "access": r"r/?w|read/write|access|acc\.?|attributes?|property|change(s|d|able)?( .*)?|modif(\.|y|ication)?( .*)?",
+    "access": r"r/?w|read/write|access|acc\.?|attributes?|property|change(s|d|able)?( .*)?|modif(\.|y|ication)?( .*)?"
+    r"|edit(able)?",
 }
 _ACCESS = {
     "ro": r"r|ro|read( ?only)?|r only",

@@ -17,6 +17,8 @@ Bits = Mapping[tuple[int, int], int]
 """Of a word, the highest and the lowest bit of a field, and what stands there."""
 
 _MOST_SHOWN = 8
+_READY = "ready"
+"""The bit that tells whether a drive can be started."""
 
 
 @dataclass
@@ -46,6 +48,22 @@ class State:
     numbers: dict[str, int]
     bits: dict[str, Bits]
     source: str
+
+    def fields(self) -> list[tuple[int, int]]:
+        """Highest and lowest bit of each field: of those that tell a state, and of others that its table names."""
+        fields = list(dict.fromkeys(place for bits in self.bits.values() for place in bits))
+        taken = {bit for high, low in fields for bit in range(low, high + 1)}
+        named = (place for place in self.register.bits if not taken.intersection(range(place[1], place[0] + 1)))
+        return [*fields, *named]
+
+    def name(self, place: tuple[int, int]) -> str:
+        """What a field is called: as the table has it, or by its bits."""
+        high, low = place
+        return self.register.bits.get(place) or (f"bit_{high}" if high == low else f"bits_{high}_{low}")
+
+    def names(self) -> list[str]:
+        """What all fields are called, where it tells by bits."""
+        return [self.name(place) for place in self.fields()] if self.bits else []
 
 
 @dataclass
@@ -79,11 +97,15 @@ class Ramp:
 
 @dataclass
 class Watchdog:
-    """What the drive does where the bus is silent for *timeout*: *action* says it, if there is such a parameter."""
+    """What the drive does where the bus is silent for *timeout*: *action* says it, if there is such a parameter.
+
+    *fault* is the number of the fault that it trips.
+    """
 
     timeout: str
     action: str
     words: dict[str, int]
+    fault: int | None
     source: str
 
 
@@ -153,6 +175,8 @@ class Answers:
         if self.is_read_back:
             roles["setpoint"] = self.setpoint
         yield from _table("status", **{role: row.name for role, row in roles.items() if row is not None})
+        if self.state is not None and _READY in self.state.names():
+            yield from _keys(words=[self.state.register.name])
         if self.ramp is not None:
             yield from _table("ramp", deceleration=self.ramp.time, start=self.ramp.start)
         for setting in self.control:
@@ -165,6 +189,8 @@ class Answers:
         if self.watchdog is not None:
             action = {"action": self.watchdog.action} if self.watchdog.action else {}
             yield from _table("watchdog", timeout=self.watchdog.timeout, **action, **self.watchdog.words)
+            if self.watchdog.fault is not None:
+                yield from _keys(fault=self.watchdog.fault)
             yield from _keys(verified=True, source=self.watchdog.source)
         yield from _table("monitor", registers=self._shown())
         if self.state is not None and self.state.bits:
@@ -200,7 +226,7 @@ class Answers:
         if state.numbers:
             yield from _table("state.codes", **state.numbers)
         for name, bits in state.bits.items():
-            fields = ", ".join(f"{_field(place)} = {value}" for place, value in bits.items())
+            fields = ", ".join(f"{state.name(place)} = {value}" for place, value in bits.items())
             yield from _table("[state.when]", **{"is": name})
             yield f"fields = {{ {fields} }}"
 
@@ -211,8 +237,10 @@ class Answers:
     def _bits(self, state: State) -> Iterator[str]:
         yield from _table("bits")
         yield f"{state.register.name} = ["
-        for place in dict.fromkeys(place for bits in state.bits.values() for place in bits):
-            yield f"    {{ name = {_said(_field(place))}, bits = [{place[0]}, {place[1]}] }},"
+        for place in state.fields():
+            name = state.name(place)
+            values = ', values = { 0 = "not ready", 1 = "ready" }' if name == _READY else ""
+            yield f"    {{ name = {_said(name)}, bits = [{place[0]}, {place[1]}]{values} }},"
         yield "]"
 
     def _shown(self) -> list[str]:
@@ -221,11 +249,6 @@ class Answers:
         measured = [row for row in self.table.registers if row.access == "ro" and row.scale is not None and row.unit]
         names = [row.name for row in (*roles, *measured) if row is not None]
         return list(dict.fromkeys(names))[:_MOST_SHOWN]
-
-
-def _field(place: tuple[int, int]) -> str:
-    high, low = place
-    return f"bit_{high}" if high == low else f"bits_{high}_{low}"
 
 
 def _table(name: str, **keys: object) -> Iterator[str]:

@@ -6,16 +6,18 @@ Nothing is guessed: what the manual does not print is left out by Enter, and wha
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import TypeVar
 
+from drivebus import tables
 from drivebus.cli import answer_values as values
 from drivebus.cli.dialogue import Dialogue
+from drivebus.cli.interview_parameters import ParameterQuestions
 from drivebus.cli.interview_tables import Pages, TableQuestions, content, one_of
 from drivebus.cli.manual_cells import TableRow
-from drivebus.cli.profile_answers import Answers, Commands, Ramp, Setting, Share, State, Watchdog
+from drivebus.cli.profile_answers import Answers, Bits, Commands, Share, State
 from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["ask"]
@@ -39,7 +41,6 @@ _STATES = {
 _SPEED_UNITS = {"Hz", "%", "rpm"}
 _BY_BITS = ("fault", "forward", "reverse", "running", "stopped")
 """Of those that fit, the first counts, where none is a running motor."""
-_ADDRESS = r"0x[0-9a-f]{1,4}|[0-9a-f]{1,4}h|[34]\d{4,5}"
 
 
 def ask(table: Path | None, source: str | None, count: str | None) -> Answers:
@@ -77,6 +78,7 @@ class _Interview:
         self._pages = Pages(dialogue, manual)
         self.tables = TableQuestions(dialogue, self._pages)
         self.table = self.tables.table
+        self._parameters = ParameterQuestions(dialogue, self._pages, self.table)
         self._used: list[TableRow] = []
 
     def fill(self, answers: Answers) -> None:
@@ -91,15 +93,15 @@ class _Interview:
                 answers.setpoint = None
         answers.state = self._state()
         answers.frequency = self._register("Register that tells the output frequency", "Output frequency", "ro", {"Hz"})
-        if answers.frequency is not None and not self._counts(answers.frequency, "Hz", "it"):
+        if answers.frequency is not None and not self._parameters.counts(answers.frequency, "Hz", "it"):
             answers.frequency = None
         answers.fault = self._register("Register that tells the number of a fault", "Fault", "ro", set())
         if answers.fault is not None and answers.fault.scale is None:
             answers.fault.scale = 1
-        answers.control.extend(self._control())
-        answers.ramp = self._ramp()
-        answers.watchdog = self._watchdog()
-        self._take_access()
+        answers.control.extend(self._parameters.control())
+        answers.ramp = self._parameters.ramp()
+        answers.watchdog = self._parameters.watchdog()
+        self._parameters.take_access()
         if answers.fault is not None:
             question = "File with the numbers of the faults, 1 OC overcurrent (- to paste; Enter: none)"
             answers.faults = self._dialogue.optional(question, self._faults) or []
@@ -114,7 +116,10 @@ class _Interview:
             answers.serial = (*line, self._pages.source())
 
     def _faults(self, text: str) -> list[tuple[int, str, str]]:
-        return values.faults(content(self._dialogue, text))
+        found = values.faults(content(self._dialogue, text))
+        said = ", ".join(" ".join(filter(None, (str(number), code, label))) for number, code, label in found)
+        self._dialogue.say(f"Faults: {said}.")
+        return found
 
     def _commands(self) -> Commands | None:
         register = self._register("Register that takes run and stop", "Command to the motor", "wo", set())
@@ -141,6 +146,8 @@ class _Interview:
         if "run_forward" in words and not {"stop", "coast"} & set(words):
             self._dialogue.say("Without a stop and a coast it is not started by name.")
         _widen(register, [*words.values()])
+        said = (f"{command.replace('_', ' ')} {word:04X}H" for command, word in words.items())
+        self._dialogue.say(f"{register.name} ({tables.shown(register.address)}) takes {', '.join(said)}.")
         is_printed = self._dialogue.agreed("Are these words in the manual of this very drive?", default=True)
         return Commands(register, words, elsewhere, is_printed, source)
 
@@ -156,7 +163,7 @@ class _Interview:
         if how == "number":
             numbers = self._each_state(_STATES, "Number", values.word)
             return State(register, numbers, {}, source) if numbers else None
-        bits = self._each_state(_BY_BITS, "Bits, such as 0=1, 4-3=2,", values.bits)
+        bits = self._each_state(_BY_BITS, "Bits, such as 0=1, 4-3=2,", values.bits, _is_shown)
         return State(register, {}, bits, source) if bits else None
 
     def _take_speed(self, row: TableRow) -> Share | None:
@@ -174,8 +181,8 @@ class _Interview:
             return None
         counts, of = said
         whole = "100 % is the parameter, such as P00.03"
-        code = self._parameter(of) if of else self._dialogue.needed(whole, self._parameter)
-        if not self._counts(code, "Hz", code.code):
+        code = self._parameters.parameter(of) if of else self._dialogue.needed(whole, self._parameters.parameter)
+        if not self._parameters.counts(code, "Hz", code.code):
             return None
         if not (code.low and code.high):
             ends = f"{code.code} may be from and to, in Hz, such as 10 400"
@@ -212,124 +219,32 @@ class _Interview:
         if not self._dialogue.agreed(f"{told[:1].upper()}{told[1:]}. Is it {text} all the same?", default=False):
             raise WrongUse(f"{text} is not what the table says")
 
-    def _control(self) -> Iterator[Setting]:
-        question = "Parameter that must be set so that the bus gives commands, or the speed: P00.01=2 (Enter: no more)"
-        while (found := self._dialogue.optional(question, self._setting)) is not None:
-            row, value = found
-            if row.scale is None:
-                row.scale = 1
-            if not (row.choices or row.low or row.high):
-                ends = f"{row.code} may be from and to, such as 0 3 (Enter: not printed; then it is set by hand)"
-                between = self._dialogue.optional(ends, values.two_numbers)
-                if between is not None:
-                    row.take_range(*(f"{end:g}" for end in between))
-            yield Setting(row.code, value, row.label, row.source)
+    def _each_state(
+        self,
+        states: Iterable[str],
+        question: str,
+        read: Callable[[str], T],
+        check: Callable[[str, T, Mapping[str, T]], None] = lambda _state, _told, _known: None,
+    ) -> dict[str, T]:
+        """What tells each of *states*, where *check* agrees.
 
-    def _setting(self, text: str) -> tuple[TableRow, int]:
-        code, equals, value = text.partition("=")
-        if not equals:
-            raise WrongUse(f'"{text}" is no parameter and value, such as P00.01=2')
-        row = self._parameter(code.strip())
-        called = next((number for number, label in row.choices.items() if label.lower() == value.strip().lower()), None)
-        word = values.word(value.strip()) if called is None else called
-        if row.choices and word not in row.choices:
-            known = ", ".join(f"{number} {label}" for number, label in row.choices.items())
-            if not self._dialogue.agreed(f"The table has {known}. Is {word} printed all the same?", default=False):
-                raise WrongUse(f"{row.code} cannot be {word}")
-            row.choices[word] = "not in the table"
-        return row, word
-
-    def _ramp(self) -> Ramp | None:
-        """What tells how long a stop takes, so that it is known when the motor should stand."""
-        time = self._dialogue.optional("Parameter with the time of the ramp of a stop, in seconds", self._parameter)
-        if time is None:
-            return None
-        start = self._dialogue.optional("Parameter with the frequency which that time begins from", self._parameter)
-        if start is None or not (self._counts(time, "s", time.code) and self._counts(start, "Hz", start.code)):
-            self._dialogue.say("Then a stop waits for standstill, however long that is.")
-            return None
-        return Ramp(time.code, start.code)
-
-    def _watchdog(self) -> Watchdog | None:
-        """What the drive does of its own where the bus is silent."""
-        timeout = self._dialogue.optional(
-            "Parameter with the time after which it acts on a silent bus", self._parameter
-        )
-        if timeout is None or not self._counts(timeout, "s", timeout.code):
-            return None
-        action = self._dialogue.optional("Parameter that says what it does then", self._parameter)
-        if action is None:
-            return Watchdog(timeout.code, "", {}, timeout.source)
-        action.scale = 1 if action.scale is None else action.scale
-        read = values.new(known := dict[str, int](), values.word)
-        for what, question in (("stop", "Its value for a stop along the ramp"), ("coast", "Its value for a coast")):
-            word = self._dialogue.optional(question, read)
-            if word is not None:
-                known[what] = word
-        return Watchdog(timeout.code, action.code, known, timeout.source)
-
-    def _counts(self, row: TableRow, unit: str, called: str) -> bool:
-        """Whether it is known how many counts of *row* one *unit* has, or it is said now."""
-        if row.unit != unit or row.scale is None:
-            such = "0.1 s" if unit == "s" else f"0.01 {unit}"
-            question = f"One count of {called} is, such as {such}"
-            step = self._dialogue.optional(question, lambda text: values.step(text, unit))
-            if step is None:
-                return False
-            row.unit, row.scale = unit, int(1 / step)
-            row.take_printed()
-        return True
-
-    def _take_access(self) -> None:
-        """Which parameters may be written while the motor turns, where their table does not tell."""
-        unknown = {row.code.lower(): row for row in self.table.parameters if row.access == "unknown"}
-        if not unknown:
-            return
-        asked = ", ".join(row.code for row in unknown.values())
-        question = f"Which of {asked} may be written while the motor turns: codes, or all (Enter: none)"
-
-        def codes(text: str) -> list[TableRow]:
-            said = [*unknown] if text.lower() == "all" else re.split(r"[, ]+", text.lower())
-            wrong = next((code for code in said if code not in unknown), None)
-            if wrong is not None:
-                raise WrongUse(f'"{wrong}" is none of {asked}')
-            return [unknown[code] for code in said]
-
-        for row in self._dialogue.optional(question, codes) or []:
-            row.access = "run"
-        for row in unknown.values():
-            row.access = "stop" if row.access == "unknown" else row.access
-
-    def _each_state(self, states: Iterable[str], question: str, read: Callable[[str], T]) -> dict[str, T]:
-        """What tells each of *states*. Who has named a direction is not asked for a state without one."""
+        Who has named a direction is not asked for a state without one.
+        """
         known: dict[str, T] = {}
+        new = values.new(known, read)
         for state in states:
             if state == "running" and {"forward", "reverse"} & set(known):
                 continue
-            told = self._dialogue.optional(f"{question} {_STATES[state]}", values.new(known, read))
+
+            def checked(text: str, state: str = state) -> T:
+                told = new(text)
+                check(state, told, known)
+                return told
+
+            told = self._dialogue.optional(f"{question} {_STATES[state]}", checked)
             if told is not None:
                 known[state] = told
         return known
-
-    def _parameter(self, text: str) -> TableRow:
-        """A parameter by its code, or by the name or the address of its row."""
-        row = self.table.called(text)
-        if row is None and re.fullmatch(_ADDRESS, text.lower()):
-            row = self.table.at(values.place(text)[1])
-            if row is None:
-                raise WrongUse(f"no table has {text}; say its code, as the keypad shows it")
-        if row is not None:
-            called = f"The code of {row.name}, as the keypad shows it"
-            row.code = row.code or self._dialogue.needed(called, values.code)
-            return row
-        code = values.code(text)
-        question = f"No table has {code}. Its address on the bus (Enter: another code)"
-        found = self._dialogue.optional(question, values.place)
-        if found is None or found[0] != "holding":
-            raise WrongUse(f"{code} needs the address of a holding register")
-        row = self.table.at(found[1]) or self.table.add(found[1], code, self._pages.source())
-        row.code = row.code or code
-        return row
 
     def _register(self, question: str, label: str, access: str, units: set[str]) -> TableRow | None:
         """The row that is named by its name or address; one that no table has is made. It is in none but *units*."""
@@ -364,7 +279,8 @@ class _Interview:
     def _reset(self, text: str, register: TableRow, words: Mapping[str, int]) -> tuple[TableRow, int]:
         """A word that means one thing only to *register*, or another register and its word."""
         place, equals, said = (part.strip() for part in text.rpartition("="))
-        address = values.place(place)[1] if equals else register.address
+        named = self.table.called(place) if equals else register
+        address = named.address if named is not None else values.place(place)[1]
         if address == register.address:
             return register, values.new(words, values.command_word)(said)
         word = values.command_word(said)
@@ -372,6 +288,18 @@ class _Interview:
         _allow(row, "wo")
         _widen(row, [word])
         return row, word
+
+
+def _is_shown(state: str, told: Bits, known: Mapping[str, Bits]) -> None:
+    """That *told* leaves each state to be told: the first of *known* that fits is the one that counts."""
+    for other, bits in known.items():
+        shown = ", ".join(
+            f"{high}={value}" if high == low else f"{high}-{low}={value}" for (high, low), value in bits.items()
+        )
+        if bits.items() <= told.items():
+            raise WrongUse(f"{other} is told by {shown}, and so {state} would never be. Which bit is another one then?")
+        if state == "stopped" and told.items() <= bits.items():
+            raise WrongUse(f"a motor that runs {other} shows that too ({shown})")
 
 
 def _most_words(text: str) -> int:

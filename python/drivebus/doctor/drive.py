@@ -101,10 +101,15 @@ class DriveExamination:
             return f"it trips{fault} {when}; what that does to the motor is set elsewhere in the drive"
         action = self.drive.read(watchdog.action)
         set_to = f"{watchdog.action} is {action}"
-        # Only one of the actions is a fault; with the others the keypad shows nothing, and the motor may run on.
-        if watchdog.actions.get("coast") == action:
+        done = next((done for done, word in watchdog.actions.items() if word == action), None)
+        if done == "trip":
+            return f"it trips{fault} {when}; what that does to the motor is set elsewhere in the drive: {set_to}"
+        if done == "coast" and "trip" not in watchdog.actions:
             return f"it trips{fault} and coasts {when}: {set_to}"
-        return f"it trips nothing {when}: {set_to}"
+        if done is not None:
+            return f"it {done}s, and trips nothing, {when}: {set_to}"
+        # The motor may run on.
+        return f"what it does {when}, this alone tells: {set_to}"
 
     def _fault(self) -> Finding | None:
         try:

@@ -16,7 +16,8 @@ class WatchdogSettings:
         timeout: The parameter that holds how long the bus may be silent.
         action: The parameter that holds what the drive then does; None: it trips, and what the fault does to the motor
             is set elsewhere in the drive.
-        actions: The value of *action* for each thing it can do: `"coast"`, `"stop"`.
+        actions: The value of *action* for each thing it can do: `"coast"`, `"stop"`, `"trip"`. Without one for a trip
+            alone, a coast trips the fault, too.
         verified: Whether a document of this very family prints them.
         source: The document that says so.
         note: What else is known; says what is assumed where it is not verified.
@@ -33,5 +34,5 @@ class WatchdogSettings:
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """What `Drive.watchdog` can have the drive do: `"coast"`, `"stop"`, or only `"trip"`."""
+        """What `Drive.watchdog` can have the drive do: `"coast"`, `"stop"`, `"trip"`."""
         return tuple(self.actions) if self.action is not None else ("trip",)

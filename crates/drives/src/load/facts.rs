@@ -227,7 +227,8 @@ pub(super) fn watchdog(
     let row = spanned.get_ref();
     let timeout = entries.get(file, &row.timeout, problems).map(|entry| entry.name.clone());
     let action = row.action.as_ref().map(|action| entries.get(file, action, problems));
-    let (mut coast, mut stop, mut name) = (None, None, None);
+    let (mut coast, mut stop, mut trip, mut name) = (None, None, None, None);
+    let says_what = [&row.coast, &row.stop, &row.trip].into_iter().any(Option::is_some);
     match action {
         // The name that it is given is not known, which was noted.
         Some(None) => return None,
@@ -236,17 +237,18 @@ pub(super) fn watchdog(
                 let value = value.as_ref()?;
                 problems.keep(check(file, line(file, value), &action.quantity, &action.name, *value.get_ref()))
             };
-            (coast, stop) = (word(&row.coast), word(&row.stop));
-            if row.coast.is_none() && row.stop.is_none() {
-                problems.add(file, line(file, spanned), "a watchdog needs the value of \"coast\" or of \"stop\"");
+            (coast, stop, trip) = (word(&row.coast), word(&row.stop), word(&row.trip));
+            if !says_what {
+                let reason = "a watchdog needs the value of \"coast\", \"stop\" or \"trip\"";
+                problems.add(file, line(file, spanned), reason);
             }
             name = Some(action.name.clone());
         }
-        None if row.coast.is_some() || row.stop.is_some() => {
+        None if says_what => {
             problems.add(
                 file,
                 line(file, spanned),
-                "\"coast\" and \"stop\" are values of \"action\", which is missing",
+                "\"coast\", \"stop\" and \"trip\" are values of \"action\", which is missing",
             );
         }
         None => {}
@@ -256,6 +258,7 @@ pub(super) fn watchdog(
         action: name,
         coast,
         stop,
+        trip,
         fault: row.fault,
         verified: row.verified,
         note: row.note.clone(),

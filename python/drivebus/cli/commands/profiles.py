@@ -243,7 +243,8 @@ def _ask(context: click.Context, session: Session, folder: Path, ask: Callable[[
     _write(folder, written)
     session.out.say(f"{folder}: {', '.join(written)}")
     _check(context, session, folder, read=is_there, is_new=True)
-    session.out.say(f"Try it on a simulated drive: drivebus sim --units 1={folder}")
+    unit = answers.serial[2] if answers.serial is not None else 1
+    session.out.say(f"Try it on a simulated drive: drivebus sim --units {unit}={folder}")
 
 
 def _goes_on(session: Session) -> bool:

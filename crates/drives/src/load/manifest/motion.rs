@@ -311,6 +311,8 @@ pub(in crate::load) struct Watchdog {
     pub(in crate::load) coast: Option<Placed<i64>>,
     /// What the action must be so that it stops, in counts.
     pub(in crate::load) stop: Option<Placed<i64>>,
+    /// What the action must be so that it trips, and nothing else, in counts. Without it, a coast trips, too.
+    pub(in crate::load) trip: Option<Placed<i64>>,
     /// The number of the fault that it trips.
     pub(in crate::load) fault: Option<u16>,
     /// Whether a document of this very family prints it.

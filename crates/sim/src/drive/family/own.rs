@@ -5,8 +5,8 @@
 //! - Assumption: what a profile has no role for goes by the name that shipped families give it: `bus_voltage`,
 //!   `output_voltage`, `output_current`, `rotation_speed`, `output_power`, `output_torque`, `input_state`, and
 //!   `acceleration_time_1`, without which a start takes as long as a stop. Other registers that can only be read are 0.
-//! - Assumption: the faults called OL1 and CE are those of an overload and of a silent bus. Without OL1 an overload
-//!   does not trip; without CE the motor coasts.
+//! - Assumption: the fault called OL1 is that of an overload, and CE that of a silent bus where the watchdog names none.
+//!   Without OL1 an overload does not trip; without a fault of a silent bus the motor coasts.
 //! - Assumption: refusals are those of the Modbus specification, and 04H for what the drive does not do now.
 //! - Assumption: a jog is as fast, and its ramps take as long, as where no parameter is known.
 
@@ -95,7 +95,7 @@ pub(crate) fn family(profile: &Profile) -> Result<Family, Vec<String>> {
         roles,
         delay: delay.unwrap_or(USUAL_DELAY),
         max_hertz: own.highest_hertz().unwrap_or(USUAL_MAX_HZ),
-        faults: Faults { overload: own.fault(OVERLOAD), silent_bus: own.fault(SILENT_BUS) },
+        faults: Faults { overload: own.fault(OVERLOAD), silent_bus: own.silent_bus() },
     })
 }
 
@@ -253,7 +253,8 @@ impl Own<'_> {
         let deceleration = parameter(Some(deceleration), "s");
         let watchdog = self.profile.watchdog();
         let on_silence = watchdog.and_then(|watchdog| {
-            let words = [(watchdog.coast, OnSilence::Trip), (watchdog.stop, OnSilence::Stop)];
+            let coast = if watchdog.trip.is_some() { OnSilence::Coast } else { OnSilence::Trip };
+            let words = [(watchdog.coast, coast), (watchdog.stop, OnSilence::Stop), (watchdog.trip, OnSilence::Trip)];
             let words = words.into_iter().filter_map(|(word, action)| Some((word?, action))).collect();
             Some(Silence { parameter: self.address_of(watchdog.action.as_deref()?)?, words })
         });
@@ -303,6 +304,10 @@ impl Own<'_> {
 
     fn fault(&self, mnemonic: &str) -> Option<u16> {
         self.profile.faults().find(|fault| fault.mnemonic == mnemonic).map(|fault| fault.code)
+    }
+
+    fn silent_bus(&self) -> Option<u16> {
+        self.profile.watchdog().and_then(|watchdog| watchdog.fault).or_else(|| self.fault(SILENT_BUS))
     }
 
     /// Where the drive remembers faults, the latest first: what it shows as the present one too, where that holds.

@@ -178,6 +178,8 @@ pub(crate) enum OnSilence {
     /// Only while the bus is obeyed.
     StopIfObeyed,
     Stop,
+    /// The motor coasts, and no fault is shown.
+    Coast,
 }
 
 impl Silence {
