@@ -644,6 +644,7 @@ def test_what_a_manual_calls_bits_and_trips_is_kept(there: Path) -> None:
             drive.run(60.0)
         drive.run(12.5)
         assert drive.status().ready is True
+        assert 500 < drive.read("dc_link") < 600
         for action, state, shown in ((0, "fault", 14), (1, "stopped", 0), (2, "stopped", 0)):
             drive.write({"A.030": 3.0, "A.031": action}, store=True)
             drive.run(12.5)

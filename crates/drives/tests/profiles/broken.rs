@@ -208,7 +208,7 @@ fn a_watchdog_may_be_missing_and_must_not_be_empty() {
     let idle = table.replace("coast = 0\nstop = 3\n", "");
     assert_ne!(idle, table);
     copy.write("profile.toml", format!("{before}[watchdog]{idle}\n\n{after}"));
-    assert!(copy.load().unwrap_err().to_string().contains("needs the value of \"coast\" or of \"stop\""));
+    assert!(copy.load().unwrap_err().to_string().contains("needs the value of \"coast\", \"stop\" or \"trip\""));
 }
 
 #[test]

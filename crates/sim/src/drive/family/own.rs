@@ -2,9 +2,9 @@
 //!
 //! Nobody has typed it a second time, so a mistake in the profile agrees with itself here.
 //!
-//! - Assumption: what a profile has no role for goes by the name that shipped families give it: `bus_voltage`,
-//!   `output_voltage`, `output_current`, `rotation_speed`, `output_power`, `output_torque`, `input_state`, and
-//!   `acceleration_time_1`, without which a start takes as long as a stop. Other registers that can only be read are 0.
+//! - Assumption: what a profile has no role for goes by its name and its unit: a word such as `current` or `dc`, and none
+//!   such as `rated`; `input_state`; and `acceleration_time_1`, without which a start takes as long as a stop. Other
+//!   registers that can only be read are 0.
 //! - Assumption: the fault called OL1 is that of an overload, and CE that of a silent bus where the watchdog names none.
 //!   Without OL1 an overload does not trip; without a fault of a silent bus the motor coasts.
 //! - Assumption: refusals are those of the Modbus specification, and 04H for what the drive does not do now.
@@ -26,15 +26,17 @@ use crate::drive::machine::{Command, Direction};
 use crate::drive::map::{Access, bounds, low_word};
 use crate::drive::refusal::by_the_specification;
 
-/// What the bus reads at a register that has this name and this unit.
-const MEASURES: [(&str, &str, Measure); 6] = [
-    ("bus_voltage", "V", Measure::BusVoltage),
-    ("output_voltage", "V", Measure::Voltage),
-    ("output_current", "A", Measure::Current),
-    ("rotation_speed", "rpm", Measure::Speed),
-    ("output_power", "%", Measure::Power),
-    ("output_torque", "%", Measure::Torque),
+/// What the bus reads at a register whose name has one of these words, and that has this unit: the first that fits.
+const MEASURES: [(&[&str], &str, Measure); 6] = [
+    (&["bus", "dc", "link"], "V", Measure::BusVoltage),
+    (&["voltage"], "V", Measure::Voltage),
+    (&["current"], "A", Measure::Current),
+    (&["speed"], "rpm", Measure::Speed),
+    (&["power"], "%", Measure::Power),
+    (&["torque"], "%", Measure::Torque),
 ];
+/// Words in the names of what does not change as the motor turns.
+const NOT_MEASURED: [&str; 8] = ["rated", "set", "setpoint", "reference", "max", "min", "limit", "input"];
 const INPUTS: &str = "input_state";
 const ACCELERATION: &str = "acceleration_time_1";
 const DECELERATION: &str = "deceleration_time_1";
@@ -390,8 +392,9 @@ impl Own<'_> {
         } else if entry.name() == INPUTS {
             Shows::Inputs(None)
         } else {
-            let known = MEASURES.iter().find(|(name, unit, _)| *name == entry.name() && *unit == quantity.unit());
-            known.map_or(Shows::Zero, |&(_, _, measure)| measured(measure))
+            let has = |words: &[&str]| entry.name().split('_').any(|word| words.contains(&word));
+            let known = MEASURES.iter().find(|(words, unit, _)| has(words) && *unit == quantity.unit());
+            known.filter(|_| !has(&NOT_MEASURED)).map_or(Shows::Zero, |&(_, _, measure)| measured(measure))
         }
     }
 }
