@@ -98,6 +98,16 @@ UNITS = {
         # Bit 3 coasts.
         frozenset({0, 8}),
     ),
+    # The first has its addresses, and takes the same words but for a reverse; the others have parameters there.
+    "dc1": Unit(
+        [(0x008B, 3)],
+        0x0000,
+        [
+            *("optidrive-e3", "acs355", "acs580", "v20", "a1000", "fr-d700", "h100", "gd350", "gd600", "md500"),
+            *("yl620", "chf100a", "vacon10", "sj200", "wj200", "e510"),
+        ],
+        frozenset({0, 8}),
+    ),
 }
 PAIRS = [(unit, other) for unit, known in UNITS.items() for other in known.others]
 

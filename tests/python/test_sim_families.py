@@ -62,6 +62,7 @@ FAMILIES = {
     46: "cfw500",
     47: "vfd-b",
     48: "vacon10",
+    49: "dc1",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]
@@ -275,6 +276,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "h100",
             "vf-s15",
             "optidrive-e3",
+            "dc1",
             "gs2",
             "gs4",
             "cfw500",

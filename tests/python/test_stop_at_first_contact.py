@@ -42,7 +42,9 @@ QUESTIONS = {
     # A WJ200 has its direction where this one stops.
     "sj200": (7, 125),
     # It is commanded where Goodrives and others have parameters, some of them without a code.
-    "optidrive-e3": (8, 140),
+    "optidrive-e3": (9, 158),
+    # The same, and an Optidrive E3 has its other words.
+    "dc1": (9, 158),
     # An ACS355 and others have parameters where this one is commanded.
     "vacon10": (9, 155),
     # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there; and for 0030H,

@@ -66,6 +66,7 @@ SILENT_ON_CODES = [
     "vf-s15",
     "frenic",
     "optidrive-e3",
+    "dc1",
     "sj200",
     "e510",
     "cfw500",
@@ -76,6 +77,7 @@ SIGNED = [
     *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "v20"),
     *("atv71", "atv320", "acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic", "e510"),
     "optidrive-e3",
+    "dc1",
     "sj200",
     "cfw500",
     "vacon10",
@@ -125,8 +127,10 @@ TAKEN_FOR: dict[str, list[str]] = {
     "vf-s15": ["vf-s15"],
     # And this one 080EH and 0809H.
     "frenic": ["frenic"],
-    # And this one 0005H, its state, and 008BH, P-12.
+    # And this one 0005H, its state, 008BH, P-12, and 07D0H.
     "optidrive-e3": ["optidrive-e3"],
+    # And this one the first two of them.
+    "dc1": ["dc1"],
     # And this one 2520H and 2524H.
     "e510": ["e510"],
     # And this one 091BH and 2104H, and that one 091BH and 091FH.

@@ -108,7 +108,8 @@ fn of_the_shipped_profiles_only_six_words_say_two_things() {
                         "optidrive-e3",
                         "e510",
                         "cfw500",
-                        "vacon10"
+                        "vacon10",
+                        "dc1"
                     ]
                     .contains(&name),
                 "{name}: {raw:04X}H is {said:?}"

@@ -40,6 +40,7 @@ mod md500;
 mod ms300;
 mod optidrive;
 pub(crate) mod own;
+mod powerxl;
 mod register;
 mod roles;
 mod saj8000m;
@@ -164,7 +165,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 48] = [
+const FAMILIES: [fn() -> Family; 49] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -212,6 +213,7 @@ const FAMILIES: [fn() -> Family; 48] = [
     vacon::vacon10,
     h100::h100,
     optidrive::e3,
+    powerxl::dc1,
     huanyang::huanyang,
 ];
 

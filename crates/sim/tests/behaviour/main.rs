@@ -10,6 +10,7 @@ mod bench;
 mod deltas;
 #[cfg(target_os = "linux")]
 mod ears;
+mod eaton;
 mod families;
 mod faults;
 mod fc51;
