@@ -28,7 +28,8 @@ use crate::huanyang::may_be_of;
 use crate::record::Record;
 use crate::set_otherwise::SetOtherwise;
 use crate::taken::Taken;
-use crate::task::{Cause, LineError, Mailbox, Notice, Payload, Write};
+use crate::task::{Cause, LineError, Mailbox, Notice, Payload, Read, Write};
+use crate::unlock::{key_after, unlock};
 use proof::Proof;
 use vouching::Anew;
 
@@ -90,6 +91,16 @@ enum Judged {
     Anew,
 }
 
+/// Whether a unit has to be unlocked before it takes a halt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Lock {
+    /// Nothing speaks for that.
+    #[default]
+    Open,
+    /// It may be so: a frame came to nothing, and its family locks itself.
+    Perhaps,
+}
+
 /// One unit that is to be halted.
 #[derive(Debug)]
 pub struct Halt<E> {
@@ -103,6 +114,7 @@ pub struct Halt<E> {
     command: Command,
     /// What gives its words another meaning: it is halted by a word of that.
     otherwise: Option<Box<SetOtherwise>>,
+    lock: Lock,
     told: Vec<Command>,
     began: Instant,
     until: Instant,
@@ -135,6 +147,7 @@ impl<E: LineError> Halt<E> {
             record: record.clone(),
             command: order.command,
             otherwise: None,
+            lock: Lock::Open,
             told: Vec::new(),
             began: now,
             until: now + order.within,
@@ -297,8 +310,8 @@ impl<E: LineError> Halt<E> {
     }
 
     async fn send(&mut self, line: &Mailbox<E>, target: &Target) -> Result<(), E> {
-        let (address, family) = (self.unit.same().unit(), self.unit.same().family());
-        let line = &line.taken_for(address, family);
+        let (address, family) = (self.unit.same().unit(), Arc::clone(self.unit.same().family()));
+        let line = &line.taken_for(address, &family);
         self.record.note(|sent| sent.halts_begun += 1);
         self.told.push(self.command);
         (self.sent, self.connection) = (line.now(), line.connection());
@@ -315,7 +328,8 @@ impl<E: LineError> Halt<E> {
                 connection: Some(self.connection),
                 ..Write::new(address, place, payload)
             };
-            let Err(error) = line.write(write).await else {
+            let came = self.put(line, write).await;
+            let Err(error) = came else {
                 self.was_sent = true;
                 continue;
             };
@@ -338,6 +352,30 @@ impl<E: LineError> Halt<E> {
             line.tell(Notice::TookOther { command: self.command, word, otherwise: otherwise.clone() }).await;
         }
         Ok(())
+    }
+
+    /// Writes, and once more where the unit refuses it as one that is locked, and lets itself be unlocked.
+    async fn put(&mut self, line: &Mailbox<E>, write: Write) -> Result<(), E> {
+        if std::mem::take(&mut self.lock) == Lock::Perhaps {
+            // Whatever comes of it, the halt goes out.
+            self.unlock(line, &write).await?;
+        }
+        let Err(error) = line.write(write.clone()).await else { return Ok(()) };
+        let profile = self.unit.same().family().profile();
+        self.lock = if profile.unlock().is_some() { Lock::Perhaps } else { Lock::Open };
+        let is_locked = key_after(profile, error.cause()).is_some();
+        if is_locked && self.unlock(line, &write).await? { line.write(write).await } else { Err(error) }
+    }
+
+    /// Unlocks the unit that is to take `write`, if its family wants that. Whether it was.
+    async fn unlock(&self, line: &Mailbox<E>, write: &Write) -> Result<bool, E> {
+        let profile = self.unit.same().family().profile();
+        let Some(key) = profile.unlock() else { return Ok(false) };
+        let how = |read: Read| read.urgent(true).once_within(ANSWER_WITHIN);
+        match unlock(line, key, profile, write, how).await {
+            Err(error) if matches!(error.cause(), Cause::Other | Cause::Halted) => Err(error),
+            came => Ok(came.unwrap_or(false)),
+        }
     }
 
     /// Why nothing was taken.

@@ -117,6 +117,7 @@ mod status;
 mod taken;
 pub mod task;
 mod unit;
+mod unlock;
 mod values;
 mod waits;
 mod wanted;

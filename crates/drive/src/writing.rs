@@ -5,11 +5,13 @@ use drivebus_rtu::Meaning;
 use thiserror::Error;
 
 use crate::aim::{NotTaken, check_harmless};
+use crate::asked::NotTold;
 use crate::families::Families;
 use crate::harm::What;
 use crate::same_unit::NotSame;
 use crate::task::{Cause, LineError, Mailbox, Payload, Write};
 use crate::unit::Unit;
+use crate::unlock::{key_after, unlock};
 
 /// How often an absolute value is sent once more to a drive that could not take it, as it says.
 const AGAIN: u32 = 4;
@@ -91,19 +93,70 @@ impl Unit {
         let is_repeated = words.is_absolute && words.read_back.is_none();
         let mut again = if is_repeated { 0 } else { AGAIN };
         let mut connection = self.make_sure(line, families, words).await?;
+        let mut is_unlocked = self.unlock_first(line, words, connection).await?;
         loop {
             let Err(error) = self.send(line, words, connection).await else { return Ok(()) };
             match error.cause() {
                 // A port that was lost is opened by what comes next. That was refused, to see first who answers there.
                 Cause::Port if !error.was_sent() && line.connection() != connection => {
                     connection = self.make_sure(line, families, words).await?;
+                    self.unlock_first(line, words, connection).await?;
                     return self.send(line, words, connection).await.map_err(NotWritten::Failed);
+                }
+                cause if !is_unlocked && key_after(self.profile(), cause).is_some() => {
+                    is_unlocked = true;
+                    if !self.unlock(line, words, connection).await? {
+                        return Err(NotWritten::Failed(error));
+                    }
                 }
                 Cause::Refused(code, _) if again < AGAIN && self.family().meaning_of(code) == Meaning::AskAgain => {
                     again += 1;
                 }
                 _ => return Err(NotWritten::Failed(error)),
             }
+        }
+    }
+
+    /// Unlocks the unit before `words`, unless they are a value and it took a word before: then it may refuse them, and is
+    /// unlocked then. Whether it was.
+    async fn unlock_first<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        words: &Words,
+        connection: u64,
+    ) -> Result<bool, NotWritten<E>> {
+        let may_wait = words.is_absolute && self.same().identity().is_unlocked(connection);
+        if may_wait { Ok(false) } else { self.unlock(line, words, connection).await }
+    }
+
+    /// Unlocks the unit for `words`, if its family wants that. Whether it was.
+    async fn unlock<E: LineError>(
+        &self,
+        line: &Mailbox<E>,
+        words: &Words,
+        connection: u64,
+    ) -> Result<bool, NotWritten<E>> {
+        let Some(key) = self.profile().unlock().filter(|unlock| unlock.place != words.place) else { return Ok(false) };
+        let line = &line.taken_for(self.address(), self.family());
+        match unlock(line, key, self.profile(), &self.frame(words, connection), |read| read).await {
+            Ok(true) => Ok(true),
+            // Whoever means its name all the same has it told what they want, and nothing else.
+            Ok(false) if self.same().is_trusted() => Ok(false),
+            Ok(false) => Err(NotWritten::Harm(NotTaken::MayBe(Vec::new()))),
+            Err(error) if error.cause() == Cause::Halted => Err(NotWritten::Failed(error)),
+            // What was to follow was not sent.
+            Err(error) => Err(NotWritten::Harm(NotTaken::NotTold(NotTold::Failed(error)))),
+        }
+    }
+
+    /// `words` as a write to the unit that answers over this connection.
+    fn frame(&self, words: &Words, connection: u64) -> Write {
+        Write {
+            read_back: words.read_back,
+            connection: Some(connection),
+            halts: self.halts(),
+            is_forced: words.is_forced,
+            ..Write::new(self.address(), words.place, words.payload.clone().as_written(self.profile()))
         }
     }
 
@@ -145,13 +198,7 @@ impl Unit {
     /// Writes to whatever unit answers over this connection. One that says that it took it and is still at it has taken it.
     async fn send<E: LineError>(&self, line: &Mailbox<E>, words: &Words, connection: u64) -> Result<(), E> {
         self.forget_words_after(words);
-        let write = Write {
-            read_back: words.read_back,
-            connection: Some(connection),
-            halts: self.halts(),
-            is_forced: words.is_forced,
-            ..Write::new(self.address(), words.place, words.payload.clone().as_written(self.profile()))
-        };
+        let write = self.frame(words, connection);
         if let Err(error) = line.taken_for(self.address(), self.family()).write(write).await {
             match error.cause() {
                 // Where the words can be read, the bus has looked whether they are there.
@@ -160,6 +207,7 @@ impl Unit {
             }
         }
         self.took_part();
+        self.same().identity().found_unlocked(connection);
         Ok(())
     }
 }

@@ -95,6 +95,7 @@ pub use parts::rules::{Protocol, Requests, UnitKind};
 pub use parts::serial::SerialDefaults;
 pub use parts::setpoint::{Setpoint, SetpointRole};
 pub use parts::state::{State, StateRule, StateWord};
+pub use parts::unlock::Unlock;
 pub use parts::variant::{Share, Variant, VariantChoice, VariantError};
 pub use parts::watchdog::Watchdog;
 pub use place::{Place, Table};

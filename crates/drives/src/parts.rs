@@ -9,5 +9,6 @@ pub(crate) mod rules;
 pub(crate) mod serial;
 pub(crate) mod setpoint;
 pub(crate) mod state;
+pub(crate) mod unlock;
 pub(crate) mod variant;
 pub(crate) mod watchdog;

@@ -26,6 +26,7 @@ use crate::parts::rules::{Groups, Requests, UnitKind};
 use crate::parts::serial::{SerialDefaults, USUAL_READ_COST};
 use crate::parts::setpoint::{Setpoint, SetpointRole};
 use crate::parts::state::{State, StateWord};
+use crate::parts::unlock::Unlock;
 use crate::parts::variant::Variant;
 use crate::parts::watchdog::Watchdog;
 use crate::place::{Place, Table};
@@ -62,6 +63,7 @@ pub struct Profile {
     pub(crate) identifications: Vec<Identification>,
     pub(crate) signature: Option<Signature>,
     pub(crate) command_address: Option<Place>,
+    pub(crate) unlock: Option<Unlock>,
     pub(crate) commands: BTreeMap<Command, CommandCode>,
     /// Codes that the family defines and that have no name here.
     pub(crate) other_commands: BTreeMap<u16, String>,
@@ -384,6 +386,11 @@ impl Profile {
     /// What was [chosen](Self::with_variants) of the variants.
     pub fn chosen(&self) -> &BTreeMap<String, String> {
         &self.chosen
+    }
+
+    /// What the drive must be told before it takes any word that is written to it; `None` where it need not.
+    pub fn unlock(&self) -> Option<&Unlock> {
+        self.unlock.as_ref()
     }
 
     /// What makes the drive act by itself when the bus falls silent; `None` where the family has no such thing.

@@ -33,6 +33,8 @@ pub(super) struct Known {
     pub(super) is_sure: bool,
     /// The connection over which it said that it takes the words of its profile; `None`: it did not say so yet.
     pub(super) own_words: Option<u64>,
+    /// The connection over which it took a word as one that is not locked; `None` where it did not yet.
+    pub(super) unlocked: Option<u64>,
     /// The places that no family which it may be keeps words of, or starts by.
     pub(super) harmless: BTreeSet<Place>,
 }
@@ -48,6 +50,7 @@ impl Identity {
             contradicts: false,
             is_sure: false,
             own_words: None,
+            unlocked: None,
             harmless: BTreeSet::new(),
         };
         Self(Arc::new(Mutex::new(known)))
@@ -96,6 +99,16 @@ impl Identity {
     /// It may have been set otherwise: that is asked again.
     pub(crate) fn forget_words(&self) {
         self.with(|known| known.own_words = None);
+    }
+
+    /// Whether it took a word over this connection. It may have been locked since.
+    pub(crate) fn is_unlocked(&self, connection: u64) -> bool {
+        self.with(|known| known.unlocked == Some(connection))
+    }
+
+    /// It took a word over this connection.
+    pub(crate) fn found_unlocked(&self, connection: u64) {
+        self.with(|known| known.unlocked = Some(connection));
     }
 
     /// Whether what it said was said so long ago that another drive may have taken its place unseen.

@@ -61,6 +61,7 @@ pub(super) fn profile(
     variants(file, manifest, &mut profile, &entries, problems);
     motion::commands(file, manifest, &mut profile, &mut entries, problems);
     motion::state(file, manifest, &mut profile, &mut entries, problems);
+    motion::unlock(file, manifest, &mut profile, &entries, problems);
     sequence::sequence(file, manifest, &mut profile, &mut entries, problems);
     roles(file, manifest, &mut profile.roles, &entries, problems);
     lists(file, manifest, &mut profile, &entries, problems);
@@ -161,6 +162,7 @@ fn start(file: &File, manifest: &Manifest, base: Option<Profile>, problems: &mut
             identifications: Vec::new(),
             signature: None,
             command_address: None,
+            unlock: None,
             commands: BTreeMap::new(),
             other_commands: BTreeMap::new(),
             commands_note: String::new(),

@@ -25,6 +25,8 @@ pub(super) fn view(mut base: Profile, file: &File, manifest: &Manifest, problems
     base.identifications.clear();
     base.signature = None;
     if let Some(extends) = &manifest.extends {
+        // By the word that is asked before it is unlocked, a drive is told from its sisters.
+        base.unlock = None;
         assume(&mut base, file, extends.get_ref(), problems);
     }
     base
@@ -64,6 +66,7 @@ fn drop_rows(base: &mut Profile, file: &File, dropped: &[Placed<String>], proble
         base.watchdog.take_if(|watchdog| {
             !stays(&watchdog.timeout) || watchdog.action.as_ref().is_some_and(|action| !stays(action))
         });
+        base.unlock.take_if(|unlock| [unlock.place, unlock.shown_by.0].into_iter().any(|at| Some(at) == place));
         base.moving.retain(|&at| Some(at) != place);
         if base.command_address.is_some_and(|at| Some(at) == place) {
             base.command_address = None;

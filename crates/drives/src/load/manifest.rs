@@ -7,7 +7,8 @@ mod schema;
 use std::collections::BTreeMap;
 
 pub(super) use motion::{
-    Commands, Control, Elsewhere, Scale, SetpointRole, States, Variant, VariantChoice, VariantShare, Watchdog, Word,
+    Commands, Control, Elsewhere, Scale, SetpointRole, States, Unlock, Variant, VariantChoice, VariantShare, Watchdog,
+    Word,
 };
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
@@ -64,6 +65,8 @@ pub(super) struct Manifest {
     pub(super) variants: BTreeMap<Placed<String>, Placed<Variant>>,
     pub(super) monitor: Option<Monitor>,
     pub(super) watchdog: Option<Placed<Watchdog>>,
+    /// What must be written before the drive takes any other word, of a command too.
+    pub(super) unlock: Option<Placed<Unlock>>,
     pub(super) faults: Option<Faults>,
     /// Exceptions that mean something else than in the Modbus specification.
     #[serde(default)]

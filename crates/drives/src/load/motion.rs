@@ -9,11 +9,12 @@ use super::manifest::{Elsewhere, Manifest, States, Word, line};
 use super::placed::Placed;
 use super::problems::Problems;
 use super::words;
-use crate::entry::Access;
+use crate::entry::{Access, Kind};
 use crate::parts::command::{Command, CommandCode};
 use crate::parts::rules::UnitKind;
 use crate::parts::state::{State, StateRule, StateWord};
-use crate::place::Place;
+use crate::parts::unlock::Unlock;
+use crate::place::{Place, Table};
 use crate::profile::Profile;
 
 /// The command register, its codes, and what else moves a motor.
@@ -179,6 +180,42 @@ fn first(
         needs("must come before a start: a stop and a reset wait for nothing");
     }
     Some((register.place?, code))
+}
+
+/// What the drive is told before it takes any other word. That must do nothing to a motor.
+pub(super) fn unlock(
+    file: &File,
+    manifest: &Manifest,
+    profile: &mut Profile,
+    entries: &Entries,
+    problems: &mut Problems,
+) {
+    let Some(spanned) = &manifest.unlock else { return };
+    let table = spanned.get_ref();
+    let mut place = |name: &Placed<String>, is_written: bool| {
+        let entry = entries.get(file, name, problems)?;
+        let place = entry.place.filter(|place| place.table == Table::Holding && entry.words() == 1);
+        let is_reached = if is_written { entry.access != Access::Ro } else { entry.access != Access::Wo };
+        let moves = place.is_some_and(|place| profile.moving.contains(&place) || profile.is_command(place));
+        if place.is_none() || !is_reached || entry.kind != Kind::Register || is_written && moves {
+            let does = if is_written { "written, and moves no motor" } else { "read" };
+            let reason = format!("{} must be a holding register of one word that is {does}", entry.name);
+            problems.add(file, line(file, name), reason);
+        }
+        place
+    };
+    let (register, shown) = (place(&table.register, true), place(&table.shown_by.register, false));
+    if !(1..=0x7F).contains(&table.exception) {
+        let reason = format!("exception {} must be 1 to 127", table.exception);
+        problems.add(file, line(file, spanned), reason);
+    }
+    profile.unlock = register.zip(shown).map(|(place, shown)| Unlock {
+        place,
+        word: table.word,
+        exception: table.exception,
+        shown_by: (shown, table.shown_by.word),
+        source: table.source.clone(),
+    });
 }
 
 /// A word as a key of TOML has it, which is a text: `9`, or `0x0476`.

@@ -323,3 +323,31 @@ pub(in crate::load) struct Watchdog {
     /// Where it is printed: document and page.
     pub(in crate::load) source: String,
 }
+
+/// What a drive wants to be told before it takes what is written to it.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct Unlock {
+    /// The register that takes the word. It moves no motor.
+    pub(in crate::load) register: Placed<String>,
+    /// What is written there.
+    pub(in crate::load) word: u16,
+    /// The exception by which a drive that is locked refuses a write.
+    pub(in crate::load) exception: u8,
+    /// The word by which a drive shows, each time, that it is one of this family: no other gets the one that unlocks.
+    pub(in crate::load) shown_by: ShownBy,
+    /// Where it is printed: document and page.
+    pub(in crate::load) source: String,
+}
+
+/// A word that no other drive has there.
+#[derive(Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(in crate::load) struct ShownBy {
+    /// Where it is read.
+    pub(in crate::load) register: Placed<String>,
+    /// What it is.
+    pub(in crate::load) word: u16,
+}
