@@ -67,6 +67,9 @@ RECTIFIERS = ("gd600-rectifier", "gd3000-rectifier")
 """They have no motor and no commands; the simulated ones take INVT's words."""
 INVT_STOP = (0x2000, 5)
 
+UNLOCKS = {"smd": {(0x0030, 0)}}
+"""The word before which a drive that is locked takes nothing, no halt either. It moves nothing."""
+
 _STEP = 25
 """From one case of the sample to the next: one by which the sample meets each kind of case, which a test says."""
 
@@ -267,7 +270,7 @@ class Judge:
 
     def _wrong(self, failure: str) -> Iterator[str]:
         case, unit, simulator = self._case, self._unit, self._simulator
-        own = own_halts(case.family)
+        own = own_halts(case.family) | UNLOCKS.get(case.family, set())
         if case.halt == "reset_fault":
             own |= _words(case.family, ("reset_fault",))
         foreign = [(place, word) for place, word in self._taken() if (place, word) not in own]

@@ -60,6 +60,9 @@ def drive_of(bus: Bus, family: str, *, unverified: bool) -> Drive:
 def prepare(drive: Drive) -> None:
     """Where no write is known that RAM alone keeps, it is kept in EEPROM."""
     drive.prepare_control(store=drive.profile.memory() is None)
+    if drive.profile.name == "smd":
+        # It is locked from when its power comes.
+        drive.write_words(0x0030, 0)
     if drive.profile.name in {"atv71", "atv320"}:
         # A run waits for the first setpoint.
         drive.setpoint = 10.0

@@ -382,6 +382,7 @@ class TestDelta:
                 "1003",
             ),
             "008b",
+            "0013",
         ]
 
     @pytest.mark.parametrize(("hertz", "word"), [(4.16, 0x01A0), (2.64, 0x0108), (2.66, 0x010A)])

@@ -48,6 +48,7 @@ READ_ONLY = {
             "optidrive-e3",
             "dc1",
             "vacon10",
+            "smd",
         ],
         0x02,
     ),
@@ -80,6 +81,7 @@ OUT_OF_RANGE = {
             "cfw500",
             "vfd-b",
             "vacon10",
+            "smd",
         ],
         0x03,
     ),
@@ -97,6 +99,7 @@ WITHOUT = {
     "vfd500": {"jog_stop"},
     "md500": {"jog_stop"},
     "frenic": {"coast", "jog_forward", "jog_reverse", "jog_stop"},
+    "smd": {"coast", "reset_fault", "jog_forward", "jog_reverse", "jog_stop"},
     "cfw500": {"jog_forward", "jog_reverse", "jog_stop"},
     "dc1": {"jog_forward", "jog_reverse", "jog_stop"},
     "fr-d700": {"coast", "reset_fault", "jog_forward", "jog_reverse", "jog_stop"},
@@ -132,6 +135,9 @@ class Bench:
         self.simulator = Simulator({1: family}, transport="process", clock="virtual")
         self.bus = Bus(self.simulator)
         self.machine = self.simulator.drive(1)
+        if family == "smd":
+            # It is locked from when its power comes.
+            self.write(0x0030, 0)
 
     def close(self) -> None:
         self.bus.close()

@@ -129,6 +129,7 @@ def test_where_no_page_says_that_a_ramp_is_told_the_frequency_is_looked_at(famil
         "optidrive-e3",
         "dc1",
         "sj200",
+        "smd",
         "vacon10",
         "vf-s15",
         "yl620",

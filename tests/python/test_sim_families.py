@@ -63,6 +63,7 @@ FAMILIES = {
     47: "vfd-b",
     48: "vacon10",
     49: "dc1",
+    50: "smd",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]
@@ -282,12 +283,13 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "cfw500",
             "vfd-b",
             "vacon10",
+            "smd",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:
             assert bus.transact(UNIT[family], pdu(0x08, 0, 0x12AB)) == pdu(0x08, 0, 0x12AB)
-        # An H100 and a Vacon 10 have 04H, and nothing there.
-        nothing = 0x02 if family in ("h100", "vacon10") else unknown
+        # An H100, a Vacon 10 and an SMD have 04H, and nothing there.
+        nothing = 0x02 if family in ("h100", "vacon10", "smd") else unknown
         assert refusal(bus, family, pdu(0x04, 0x2100, 1)) == nothing, family
     write_many = bytes.fromhex("10 2000 0001 02 0005")
     for family in ("gd3000", "gd3000-rectifier", "chf100a", "chv100"):

@@ -37,6 +37,8 @@ QUESTIONS = {
     # so one more word tells that they are none.
     **dict.fromkeys(("atv312", "atv12", "atv320", "atv600", "atv71"), (7, 120)),
     "cfw500": (8, 140),
+    # And for its own 0013H and 001AH; register 1 is a parameter of Goodrives and others.
+    "smd": (9, 155),
     "frenic": (9, 158),
     "v20": (8, 140),
     # A WJ200 has its direction where this one stops.

@@ -144,9 +144,9 @@ def mine(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Profile]:
     return {like: Profile.load(folder / f"my-{like}") for like in FAMILIES}
 
 
-NOT_TOLD_APART = {("optidrive-e3", "gd600"), ("optidrive-e3", "gd3000")}
-"""Its setpoint is at 0001H, where these have P00.01, and they do not say what they are. A profile without a signature
-has nothing to tell them apart by; the page of the format says so."""
+NOT_TOLD_APART = {(named, real) for named in ("optidrive-e3", "dc1") for real in ("gd600", "gd3000")}
+"""Their setpoint is at 0001H, where these have P00.01, and do not say what they are. A profile without a signature has
+nothing to tell them apart by; the page of the format says so, and `profiles check --read` shows what would tell."""
 
 
 class TestOfSomebodysOwn:

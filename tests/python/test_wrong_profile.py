@@ -70,6 +70,7 @@ SILENT_ON_CODES = [
     "sj200",
     "e510",
     "cfw500",
+    "smd",
 ]
 """The families whose units refuse 2103H."""
 
@@ -81,6 +82,7 @@ SIGNED = [
     "sj200",
     "cfw500",
     "vacon10",
+    "smd",
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -131,6 +133,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "optidrive-e3": ["optidrive-e3"],
     # And this one the first two of them.
     "dc1": ["dc1"],
+    # And this one 0013H, 001AH and 0032H, and neither 080EH nor input register 0000H.
+    "smd": ["smd"],
     # And this one 2520H and 2524H.
     "e510": ["e510"],
     # And this one 091BH and 2104H, and that one 091BH and 091FH.
@@ -225,7 +229,10 @@ def asked(simulator: Simulator) -> list[bytes]:
 
 
 def written(simulator: Simulator) -> list[bytes]:
-    return [frame for frame in asked(simulator) if frame[1] in (0x06, 0x10)]
+    """Without what unlocks an SMD before it takes a word."""
+    frames = [frame for frame in asked(simulator) if frame[1] in (0x06, 0x10)]
+    unlocks = bytes.fromhex("06 00 30 00 00") if simulator.drive(1).profile == "smd" else b""
+    return [frame for frame in frames if frame[1:-2] != unlocks]
 
 
 def answer(simulator: Simulator, word: int) -> None:

@@ -42,3 +42,6 @@ pub(crate) async fn unlock<E: LineError>(
     line.write(Write { place: unlock.place, payload, read_back: None, ..write.clone() }).await?;
     Ok(true)
 }
+
+#[cfg(test)]
+mod tests;

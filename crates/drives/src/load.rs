@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 49] = [
+static BUILTINS: [Builtin; 50] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -192,6 +192,7 @@ static BUILTINS: [Builtin; 49] = [
     builtin!("h100": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("optidrive-e3": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("dc1": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("smd": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("huanyang-hy": "registers.csv" "parameters.csv" "faults.csv"),
 ];
 

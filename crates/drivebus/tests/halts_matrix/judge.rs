@@ -71,7 +71,9 @@ impl<'p> Judge<'p> {
         let mut wrong: Vec<String> = self.seen.lock().unwrap().take().into_iter().collect();
         let drive = self.plant.drive();
         let taken: Vec<_> = drive.take_writes().iter().map(|word| (place(word), word.value)).collect();
-        let own = own_halts(&self.plant.profile);
+        let mut own = own_halts(&self.plant.profile);
+        // A drive that is locked takes no halt before.
+        own.extend(self.plant.profile.unlock().map(|unlock| (unlock.place, unlock.word)));
         let foreign: Vec<_> = taken.iter().filter(|word| !own.contains(word)).collect();
         if !foreign.is_empty() {
             wrong.push(format!("it took {foreign:04X?}"));

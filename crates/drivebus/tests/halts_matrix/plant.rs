@@ -91,6 +91,9 @@ impl Plant {
         let (drive, profile, bus) = (self.drive(), &self.profile, self.bus());
         // It is asked in the protocol that it speaks.
         bus.drive(1, profile).unwrap();
+        if let Some(unlock) = profile.unlock() {
+            self.write(&bus, (unlock.place, unlock.word));
+        }
         if drive.state() != motion.state() {
             if let Some(stop) = profile.command(Command::Stop) {
                 self.write(&bus, stop);

@@ -130,6 +130,8 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("vf-s11", "vf-s15"),
         ("JZA", "j1000"),
         ("Teco E510", "e510"),
+        ("Lenze smd", "smd"),
+        ("ac tech smd", "smd"),
         ("AutomationDirect GS2", "gs2"),
         ("gs3", "gs2"),
         ("GS4", "gs4"),

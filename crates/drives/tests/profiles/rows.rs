@@ -221,6 +221,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("cfw500", 29),
         ("chv100", 24),
         ("e510", 68),
+        ("smd", 12),
         ("eds300", 17),
         ("fc51", 23),
         ("fr-d700", 39),

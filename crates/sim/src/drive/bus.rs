@@ -214,6 +214,10 @@ impl Drive {
             Some(password) if words.len() == 1 && self.is_password(address) => self.check_password(password)?,
             _ => self.check_unlocked()?,
         }
+        let lock = self.family().roles.lock;
+        if !self.unlocked && lock.is_some_and(|lock| lock.at != address) {
+            return Err(Refusal::Locked);
+        }
         for (address, word) in (address..).zip(words.iter()) {
             self.target(address).ok_or(Refusal::Address)?;
             self.check_word(self.plain(address), word)?;
@@ -342,6 +346,15 @@ impl Drive {
             self.unlocked = true;
             return;
         }
+        let family = self.map.family();
+        if let Some(lock) = family.roles.lock {
+            let locks = family.command == Some(address) && word & lock.again != 0;
+            self.unlocked = !locks && (self.unlocked || address == lock.at);
+        }
+        let address = match (family.roles.direction, family.roles.direction_words) {
+            (Some((place, _)), Some(words)) if family.command == Some(address) && words.contains(&word) => place,
+            _ => address,
+        };
         let before = self.control_word(address);
         let (stores, word) = match self.family().memory {
             Memory::RamUntil(at, bits) if at == address => (bits == 0 || word & bits != 0, word & !bits),

@@ -45,6 +45,7 @@ mod register;
 mod roles;
 mod saj8000m;
 mod sj200;
+mod smd;
 mod sunfar;
 mod unlisted;
 mod v20;
@@ -62,7 +63,9 @@ use super::machine::Command;
 use super::refusal::Refusal;
 pub(crate) use handshake::Handshake;
 pub(crate) use register::{Bit, Bounds, Count, Flag, Measure, Parameter, Range, Register, Shows};
-pub(crate) use roles::{Absent, Deciding, OnSilence, OtherWords, Roles, Scaled, Silence, Speed, SpeedScale, SpeedUnit};
+pub(crate) use roles::{
+    Absent, Deciding, Lock, OnSilence, OtherWords, Roles, Scaled, Silence, Speed, SpeedScale, SpeedUnit,
+};
 pub(crate) use unlisted::unlisted;
 
 /// One family.
@@ -165,7 +168,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 49] = [
+const FAMILIES: [fn() -> Family; 50] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -214,6 +217,7 @@ const FAMILIES: [fn() -> Family; 49] = [
     h100::h100,
     optidrive::e3,
     powerxl::dc1,
+    smd::smd,
     huanyang::huanyang,
 ];
 

@@ -209,6 +209,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "frenic",
         "optidrive-e3",
         "dc1",
+        "smd",
     ] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }

@@ -19,6 +19,7 @@ mod goodrives;
 mod hitachi;
 mod inovance;
 mod invertek;
+mod lenze;
 mod memory;
 mod mitsubishi;
 mod own_profiles;

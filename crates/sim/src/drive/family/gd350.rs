@@ -46,6 +46,8 @@ pub(crate) fn gd350() -> Family {
             obeys: vec![(0x0001, 2), (0x0002, 0)],
             channel: Some(0x0001),
             direction: None,
+            direction_words: None,
+            lock: None,
             // Assumption: any source but 8 means the frequency set at the keypad.
             speed_source: Some(vec![(0x0006, 8)]),
             speed: Some(Speed::hertz(0x2001)),

@@ -18,6 +18,10 @@ pub(crate) struct Roles {
     pub(crate) speed_source: Option<Vec<(u16, u16)>>,
     /// The word that says which way a run turns, and what it is for reverse.
     pub(crate) direction: Option<(u32, u16)>,
+    /// Where that word cannot be written: the words to the command register that set it, for forward and for reverse.
+    pub(crate) direction_words: Option<[u16; 2]>,
+    /// What keeps it from taking anything that is written.
+    pub(crate) lock: Option<Lock>,
     /// The speed that the bus sets.
     pub(crate) speed: Option<Speed>,
     /// The speed where it does not come from the bus, Hz.
@@ -54,6 +58,15 @@ pub(crate) struct Roles {
     pub(crate) max_written: Option<u16>,
     /// The word that a read has where the drive has nothing, instead of being refused.
     pub(crate) absent: Option<Absent>,
+}
+
+/// A lock on all that is written. The drive is locked from when its power comes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lock {
+    /// Where a word unlocks it that is in range there.
+    pub(crate) at: u32,
+    /// The bits of the command register that lock it again.
+    pub(crate) again: u16,
 }
 
 /// What a drive answers where it has nothing.
@@ -197,6 +210,8 @@ impl Roles {
         channel: None,
         speed_source: None,
         direction: None,
+        direction_words: None,
+        lock: None,
         speed: None,
         keypad_frequency: None,
         max_frequency: None,
