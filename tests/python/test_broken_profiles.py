@@ -124,7 +124,7 @@ def test_people_are_told_how_many(folder: Path) -> None:
     result = CliRunner().invoke(cli, ["profiles", "check", str(folder)])
     assert result.exit_code == 2
     [line] = result.stdout.splitlines()
-    assert line.startswith(f"{folder / 'registers.csv'}, line 9: scale ")
+    assert line.startswith(f"{folder / 'registers.csv'}, line 10: scale ")
     assert "1 problem" in result.stderr
 
 
@@ -134,7 +134,7 @@ def test_a_mark_before_the_text_and_other_line_ends_are_no_mistake(folder: Path)
         (folder / file).write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
     assert check(folder, exit_code=0) == []
     change(folder / "registers.csv", "0x2101,fault_code", "8449,fault_code")
-    assert [problem["line"] for problem in check(folder)] == [6]
+    assert [problem["line"] for problem in check(folder)] == [7]
 
 
 @pytest.mark.parametrize("file", FILES)

@@ -58,7 +58,7 @@ class TestShow:
         assert known["command_codes"]["9"] == "immediate stop"
         assert known["memory"]["reason"] == "Printed for the EX-8 only."
         assert known["counts"]["registers"] == {
-            "total": 11, "sourced": 10, "unsourced": 1, "unverified": 2, "assumed": 1,
+            "total": 12, "sourced": 11, "unsourced": 1, "unverified": 2, "assumed": 1,
         }  # fmt: skip
 
     @pytest.mark.parametrize("family", drivebus.profiles())
