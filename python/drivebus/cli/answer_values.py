@@ -98,11 +98,6 @@ def bits(text: str) -> Bits:
     return found
 
 
-def hertz(text: str) -> Fraction:
-    """What one count is."""
-    return step(text, "Hz")
-
-
 def step(text: str, unit: str) -> Fraction:
     """What one count is, in *unit*."""
     said = re.fullmatch(rf"(\d*[.,]?\d+) ?{unit.lower()}", text.lower())
@@ -119,7 +114,7 @@ def speed(text: str) -> Fraction | tuple[int, str]:
     whole = re.fullmatch(r"(\d{2,5}) ?= ?(.+)", text)
     counts = 100 / part if part else Fraction(whole[1]) if whole else None
     if counts is None:
-        return hertz(text)
+        return step(text, "Hz")
     if counts.denominator != 1 or counts > 0xFFFF:
         raise WrongUse(f'"{text}" is no 1 to 65535 counts: write 10000 = P00.03, or 0.01 %')
     of = whole[2].strip() if whole else ""

@@ -79,6 +79,15 @@ class Dialogue:
         """Yes or no."""
         return self.needed(f"{question} [{'Y/n' if default else 'y/N'}]", lambda said: _agreed(said, default), "")
 
+    def insisted(self, question: str, else_said: str) -> None:
+        """Asks whether what speaks against the tables is meant.
+
+        Raises:
+            WrongUse: It is not: *else_said* says what is wrong.
+        """
+        if not self.agreed(question, default=False):
+            raise WrongUse(else_said)
+
     def pasted(self) -> str:
         """Lines of the input, until a dot stands alone in one."""
         if self._place == len(self._given):

@@ -57,17 +57,16 @@ class ParameterQuestions:
         word = values.word(value.strip()) if called is None else called
         if row.choices and word not in row.choices:
             known = ", ".join(f"{number} {label}" for number, label in row.choices.items())
-            if not self._dialogue.agreed(f"The table has {known}. Is {word} printed all the same?", default=False):
-                raise WrongUse(f"{row.code} cannot be {word}")
+            question = f"The table has {known}. Is {word} printed all the same?"
+            self._dialogue.insisted(question, f"{row.code} cannot be {word}")
             row.choices[word] = "not in the table"
-        label = row.choices.get(word, "")
-        if _NO_BUS.search(label) and not self._agreed_to(row, word, "obeys the bus"):
-            raise WrongUse(f"{row.code} = {word} is {label}")
+        if _NO_BUS.search(row.choices.get(word, "")):
+            self._insist(row, word, "obeys the bus")
         return row, word
 
-    def _agreed_to(self, row: TableRow, word: int, what: str) -> bool:
-        question = f"{row.code} = {word} is {row.choices[word]}, by its table. Is it what {what} all the same?"
-        return self._dialogue.agreed(question, default=False)
+    def _insist(self, row: TableRow, word: int, what: str) -> None:
+        called = f"{row.code} = {word} is {row.choices[word]}"
+        self._dialogue.insisted(f"{called}, by its table. Is it what {what} all the same?", called)
 
     def ramp(self) -> Ramp | None:
         """What tells how long a stop takes, so that it is known when the motor should stand."""
@@ -112,9 +111,8 @@ class ParameterQuestions:
                 raise WrongUse(f"the table has {listed}")
             label = action.choices.get(word, "")
             others = (other for name, (_, other) in _ON_SILENCE.items() if name != what)
-            is_other = means.search(label) is None and any(other.search(label) for other in others)
-            if is_other and not self._agreed_to(action, word, f"makes it {what}"):
-                raise WrongUse(f"{action.code} = {word} is {label}")
+            if means.search(label) is None and any(other.search(label) for other in others):
+                self._insist(action, word, f"makes it {what}")
             return word
 
         return read

@@ -216,8 +216,8 @@ class _Interview:
         return read
 
     def _is_meant(self, told: str, text: str) -> None:
-        if not self._dialogue.agreed(f"{told[:1].upper()}{told[1:]}. Is it {text} all the same?", default=False):
-            raise WrongUse(f"{text} is not what the table says")
+        question = f"{told[:1].upper()}{told[1:]}. Is it {text} all the same?"
+        self._dialogue.insisted(question, f"{text} is not what the table says")
 
     def _each_state(
         self,
