@@ -10,12 +10,17 @@ from typing import Any
 import drivebus.aio
 from drivebus import Simulator
 
-__all__ = ["asked", "carry_out_awaited"]
+__all__ = ["asked", "carry_out_awaited", "written"]
 
 
 def asked(line: Simulator) -> list[str]:
     """What the master sent, as hex."""
     return [frame.hex(" ").upper() for _, who, frame in line.line.trace() if who == "master"]
+
+
+def written(line: Simulator) -> list[str]:
+    """What the master wrote, without CRCs."""
+    return [frame[:-6] for frame in asked(line) if frame[3:5] in ("05", "06", "10")]
 
 
 def carry_out_awaited(

@@ -15,7 +15,7 @@ import pytest
 
 from drivebus import Bus, Drive, DrivebusError, NotAllowed, Simulator, State
 
-from .jobs import asked, carry_out_awaited
+from .jobs import asked, carry_out_awaited, written
 
 OBEY = "01 06 00 8B 00 03"
 SET_20_HZ = "01 06 00 01 00 C8"
@@ -36,11 +36,6 @@ def line() -> Iterator[Simulator]:
 def drive(line: Simulator) -> Iterator[Drive]:
     with Bus(line) as bus:
         yield bus.drive(1, "dc1", unverified=True)
-
-
-def written(line: Simulator) -> list[str]:
-    """What was written, without CRCs."""
-    return [frame[:-6] for frame in asked(line) if frame[3:5] in ("05", "06", "10")]
 
 
 def program(line: Simulator, drive: Any) -> list[Callable[[], Any]]:

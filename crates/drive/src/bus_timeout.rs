@@ -57,10 +57,7 @@ impl OnSilence {
     }
 
     fn is_of(self, settings: &Watchdog) -> bool {
-        match self {
-            Self::Trip if settings.action.is_none() => true,
-            Self::Coast | Self::Stop | Self::Trip => self.word(settings).is_some(),
-        }
+        self.word(settings).is_some() || self == Self::Trip && settings.action.is_none()
     }
 
     /// The word of the parameter that says what the drive does.
