@@ -108,6 +108,25 @@ UNITS = {
         ],
         frozenset({0, 8}),
     ),
+    # Commanded where a Yaskawa stores its parameters, and the others have one.
+    "nowforever": Unit(
+        [(0x0000, 2), (0x0002, 6)],
+        0x0900,
+        [
+            "a1000",
+            "j1000",
+            "e510",
+            "gs2",
+            "gs4",
+            "gd350",
+            "vfd-e",
+            "acs355",
+            "frenic",
+            "optidrive-e3",
+            "h100",
+            "cfw500",
+        ],
+    ),
 }
 PAIRS = [(unit, other) for unit, known in UNITS.items() for other in known.others]
 
@@ -119,7 +138,7 @@ def test_by_another_name_nothing_of_it_is_set_or_started(unit: str, named: str, 
     with Simulator({1: unit}, transport="process", clock="virtual") as line:
         with Bus(line) as bus:
             for address, word in known.obeys:
-                bus.write(1, address, word)
+                bus.write(1, address, [word] if unit == "nowforever" else word)
         line.drive(1).take_writes()
         before = line.drive(1).eeprom_writes
         with Bus(line) as bus, suppress(DrivebusError, ValueError):

@@ -126,6 +126,7 @@ def test_where_no_page_says_that_a_ramp_is_told_the_frequency_is_looked_at(famil
         "frenic",
         "h100",
         "j1000",
+        "nowforever",
         "optidrive-e3",
         "dc1",
         "sj200",

@@ -64,6 +64,7 @@ FAMILIES = {
     48: "vacon10",
     49: "dc1",
     50: "smd",
+    51: "nowforever",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]
@@ -284,6 +285,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "vfd-b",
             "vacon10",
             "smd",
+            "nowforever",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:

@@ -29,16 +29,19 @@ QUESTIONS = {
     "md500": (5, 90),
     # These are also asked for 080EH, which a FRENIC has: it answers 0 to what it does not use.
     "fr-d700": (6, 112),
-    "a1000": (7, 122),
-    "j1000": (8, 140),
+    "a1000": (8, 140),
+    "j1000": (9, 158),
     # And these, and for 7000H: an MD500 has its setpoint where they take their commands.
     **dict.fromkeys(("chf100a", "saj8000m"), (8, 135)),
     # An Altivar 600 is asked for CHCF, too: in its I/O profile 07H runs it. By the other two names nobody would ask it,
     # so one more word tells that they are none.
     **dict.fromkeys(("atv312", "atv12", "atv320", "atv600", "atv71"), (7, 120)),
-    "cfw500": (8, 140),
+    # And this one for 0502H, the output frequency of a Nowforever, which may have parameters where this has its fault.
+    "cfw500": (9, 158),
+    # Where it is commanded, most others have a parameter, and a Yaskawa stores what it has.
+    "nowforever": (17, 290),
     # And for its own 0013H and 001AH; register 1 is a parameter of Goodrives and others.
-    "smd": (9, 155),
+    "smd": (10, 172),
     "frenic": (9, 158),
     "v20": (8, 140),
     # A WJ200 has its direction where this one stops.

@@ -71,6 +71,7 @@ SILENT_ON_CODES = [
     "e510",
     "cfw500",
     "smd",
+    "nowforever",
 ]
 """The families whose units refuse 2103H."""
 
@@ -83,6 +84,7 @@ SIGNED = [
     "cfw500",
     "vacon10",
     "smd",
+    "nowforever",
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -125,6 +127,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "j1000": ["j1000"],
     # And this one 0030H and 0031H; an ACS355, whose other words it has, refuses the first.
     "cfw500": ["cfw500"],
+    # And this one 0502H and 0037H; INVT drives may have a parameter at the first.
+    "nowforever": ["nowforever"],
     # And this one FD00H and FD01H.
     "vf-s15": ["vf-s15"],
     # And this one 080EH and 0809H.
@@ -133,7 +137,7 @@ TAKEN_FOR: dict[str, list[str]] = {
     "optidrive-e3": ["optidrive-e3"],
     # And this one the first two of them.
     "dc1": ["dc1"],
-    # And this one 0013H, 001AH and 0032H, and neither 080EH nor input register 0000H.
+    # And this one 0013H, 001AH and 0032H, and neither 080EH, 0502H nor an input register.
     "smd": ["smd"],
     # And this one 2520H and 2524H.
     "e510": ["e510"],

@@ -4,7 +4,7 @@
 //! answer, what they refuse, and whose code a word is. A family that contradicts an answer is out. One whose code came,
 //! or whose whole signature, or whose state is one of its states, is *shown*. Where the named family is shown and nothing
 //! is left that its command would do harm to, it is taken; where another is shown and the named one is not, that one is.
-//! Where several are left that want different words, nobody is.
+//! Where several are left that want different words, nobody is; before that whoever is not ruled out is asked for.
 
 mod likeness;
 
@@ -131,7 +131,7 @@ impl Apart {
         if !shown.is_empty() {
             return self.one_of(&shown, &live, what);
         }
-        // Of a family that an answer does not fit, no more is asked.
+        // A family that an answer does not fit comes last.
         let mut fitting = others.iter().filter(|family| self.explains_by_rule(family));
         if let Some(place) = fitting.find_map(|family| self.next_of(family)) {
             return Verdict::Ask(place);
@@ -139,7 +139,18 @@ impl Apart {
         let is_command = matches!(what, What::Command(_));
         let takes_commands = |family: &&Arc<Family>| !family.profile().commands().is_empty();
         let is_all_that_is_left = !named.is_known_by_something() && !others.iter().any(takes_commands);
-        if self.is_trusted || is_live && (is_command || self.has_words() || is_all_that_is_left) {
+        if is_live && (self.is_trusted || is_command || self.has_words() || is_all_that_is_left) {
+            return Verdict::Take(Arc::clone(named));
+        }
+        // A drive has more words than its profile lists: before it is halted by no word of its own, whoever is not ruled
+        // out is asked for. One that answers anything shows nobody.
+        if is_command && self.has_refused() {
+            let unasked = others.iter().filter_map(|family| Some((self.words_of(family), self.next_of(family)?)));
+            if let Some((_, place)) = unasked.min_by_key(|&(words, _)| Reverse(words)) {
+                return Verdict::Ask(place);
+            }
+        }
+        if self.is_trusted {
             return Verdict::Take(Arc::clone(named));
         }
         Verdict::Undecided(live.into_iter().filter(takes_commands).cloned().collect())
@@ -231,7 +242,10 @@ impl Apart {
     /// A code and a signature say which family it is, so that only those count which would take harm. A state alone says
     /// little: whoever halts by other words counts.
     fn rivals<'a>(&self, taken: &Arc<Family>, live: &[&'a Arc<Family>], what: What) -> Vec<&'a Arc<Family>> {
-        let others = live.iter().copied().filter(|family| !is_same(family, taken) && self.explains(family));
+        // A parameter that has no row is as good for a rival as it is for this one.
+        let is_strict = self.explains(taken);
+        let fits = |family: &Family| self.explains(family) || !is_strict && self.explains_by_rule(family);
+        let others = live.iter().copied().filter(|family| !is_same(family, taken) && fits(family));
         if matches!(what, What::Word(_)) || self.is_told(taken) {
             others.filter(|family| family.is_harmed_by(what, taken)).collect()
         } else {
@@ -242,6 +256,15 @@ impl Apart {
     /// The first question by which the unit shows `family`, or not.
     fn next_of(&self, family: &Family) -> Option<Place> {
         family.telling().iter().copied().find(|&place| self.answer(place).is_none())
+    }
+
+    /// How many of the words that show `family` were answered.
+    fn words_of(&self, family: &Family) -> usize {
+        family
+            .telling()
+            .iter()
+            .filter(|&&place| self.answer(place).is_some_and(|answer| answer.word().is_some()))
+            .count()
     }
 
     /// What to ask to tell `one` from `other`: best what one has and the other is printed to refuse.

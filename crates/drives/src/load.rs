@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 50] = [
+static BUILTINS: [Builtin; 51] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -166,6 +166,7 @@ static BUILTINS: [Builtin; 50] = [
     builtin!("md500": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("a1000": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("j1000": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("nowforever": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("cfw500": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("saj8000m": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("eds300": "registers.csv" "parameters.csv" "faults.csv"),

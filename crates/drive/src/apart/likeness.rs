@@ -39,7 +39,7 @@ impl Apart {
         }
         // A state alone may be any word: what else was answered must fit, too.
         let state = family.state_place().and_then(|place| self.answer(place)).and_then(Answer::word);
-        state.is_some_and(|word| family.knows_state(word)) && self.explains(family)
+        state.is_some_and(|word| family.knows_state(word)) && self.explains_by_rule(family)
     }
 
     /// Whether its code came, or its whole signature.
@@ -63,6 +63,11 @@ impl Apart {
     /// Whether the unit answered any question, and did not refuse them all.
     pub(super) fn has_words(&self) -> bool {
         self.answered().next().is_some()
+    }
+
+    /// Whether it refused any.
+    pub(super) fn has_refused(&self) -> bool {
+        self.answers.iter().any(|answer| answer.word().is_none())
     }
 
     /// What was answered to the question for `place`; `None` where it was not asked.

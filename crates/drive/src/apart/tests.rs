@@ -7,7 +7,7 @@ use crate::family::HALTS;
 use drivebus_rtu::huanyang::Protocol;
 
 /// What Python asks of one unit at most.
-const QUESTIONS: usize = 40;
+const QUESTIONS: usize = 80;
 
 const STOP: What = What::Command(Command::Stop);
 
@@ -67,6 +67,18 @@ fn a_unit_without_a_code_is_told_by_what_it_answers_and_refuses() {
     let atv312 = shipped("atv312");
     for named in ["atv312", "gd350", "ms300"] {
         assert_eq!(taken(named, like(&atv312, &[(0x0C81, 0x0231)])), Ok("atv312".to_owned()));
+    }
+}
+
+/// E510 communication addendum, pp. 1-13 to 1-18: 05-00 to 05-48 are there, of which its profile has the first. A Nowforever has its
+/// state and its output frequency among them.
+#[test]
+fn a_unit_with_more_words_than_its_profile_lists_is_told_all_the_same() {
+    let e510 = shipped("e510");
+    for (named, is_trusted) in [("gd350", false), ("gd350", true), ("nowforever", false), ("acs355", false)] {
+        let mut apart = Apart::new(&shipped(named), Families::shipped(), is_trusted);
+        let verdict = asked(&mut apart, STOP, like(&e510, &[(0x0500, 0), (0x0502, 0), (0x2520, 4)]));
+        assert!(matches!(&verdict, Some(Verdict::Take(family)) if family.name() == "e510"), "{named}: {verdict:?}");
     }
 }
 

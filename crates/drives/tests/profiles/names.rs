@@ -123,6 +123,8 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("FRENIC-Ace", "frenic"),
         ("frenic mini", "frenic"),
         ("FRENIC-MEGA", "frenic"),
+        ("Nowforever D100", "nowforever"),
+        ("nowforever e100", "nowforever"),
         ("WEG CFW500", "cfw500"),
         ("CFW-500", "cfw500"),
         ("cfw11", "cfw500"),

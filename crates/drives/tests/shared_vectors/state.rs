@@ -109,7 +109,8 @@ fn of_the_shipped_profiles_only_six_words_say_two_things() {
                         "e510",
                         "cfw500",
                         "vacon10",
-                        "dc1"
+                        "dc1",
+                        "nowforever"
                     ]
                     .contains(&name),
                 "{name}: {raw:04X}H is {said:?}"

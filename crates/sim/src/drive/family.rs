@@ -38,6 +38,7 @@ mod huanyang;
 mod j1000;
 mod md500;
 mod ms300;
+mod nowforever;
 mod optidrive;
 pub(crate) mod own;
 mod powerxl;
@@ -168,7 +169,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 50] = [
+const FAMILIES: [fn() -> Family; 51] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -191,6 +192,7 @@ const FAMILIES: [fn() -> Family; 50] = [
     md500::md500,
     a1000::a1000,
     j1000::j1000,
+    nowforever::nowforever,
     cfw500::cfw500,
     saj8000m::saj8000m,
     eds300::eds300,

@@ -206,6 +206,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "e510",
         "vf-s15",
         "cfw500",
+        "nowforever",
         "frenic",
         "optidrive-e3",
         "dc1",

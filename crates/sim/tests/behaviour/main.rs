@@ -26,6 +26,7 @@ mod own_profiles;
 mod ports;
 mod refusals;
 mod running;
+mod spindles;
 mod teco;
 mod toshiba;
 mod vfd500;

@@ -25,6 +25,7 @@ use crate::drive::refusal::Refusal;
 
 const FREQUENCY_SOURCE: u16 = 0x0180;
 const COMMAND_SOURCE: u16 = 0x0181;
+const UNIT_ADDRESS: u16 = 0x0425;
 const SPEED_UNIT: u16 = 0x0502;
 
 pub(crate) fn a1000() -> Family {
@@ -40,7 +41,12 @@ pub(crate) fn a1000() -> Family {
         command: Some(0x0001),
         commands: COMMANDS.to_vec(),
         registers: REGISTERS.to_vec(),
-        parameters: vec![set_up(FREQUENCY_SOURCE, 2), set_up(COMMAND_SOURCE, 2), set_up(SPEED_UNIT, 0)],
+        parameters: vec![
+            set_up(FREQUENCY_SOURCE, 2),
+            set_up(COMMAND_SOURCE, 2),
+            set_up(SPEED_UNIT, 0),
+            Parameter::shown(UNIT_ADDRESS),
+        ],
         factory: &[],
         elsewhere: Vec::new(),
         control_word: None,
