@@ -347,7 +347,7 @@ def test_a_motor_on_the_ramp_is_stopping(tmp_path: Path) -> None:
         with drivebus.Bus(simulator) as bus:
             drive = bus.drive(1)
             drive.prepare_control()
-            drive.write({"P00.11": 0.5, "P00.12": 60.0})
+            drive.write({"P00.11": 0.5, "P00.12": 150.0})
         with on_a_terminal(["--port", simulator.port, "panel"], tmp_path / "record") as terminal:
             terminal.until("stopped")
             start(terminal)
