@@ -1003,6 +1003,8 @@ class Profile:
         """Most words in one read or write."""
     def parameter_groups(self) -> list[int]:
         """The groups in which a code is its own address, 0..99; without closed ones and those where registers stand."""
+    def unlisted_groups(self) -> list[int]:
+        """These, and the high bytes of other addresses at which there may be parameters without a row."""
     def role(self, role: str, /) -> str | None:
         """The register with a role: `state`, `fault`, `frequency`, `setpoint`, `deceleration`, one of `setpoints`."""
     def status_words(self) -> list[str]:

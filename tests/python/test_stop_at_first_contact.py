@@ -12,9 +12,12 @@ import drivebus
 from drivebus import Bus, Profile, Simulator
 
 QUESTIONS = {
-    **dict.fromkeys(("vfd500", "wj200", "h100", "vf-s15"), (0, 4)),
+    **dict.fromkeys(("vfd500", "wj200", "h100"), (0, 4)),
     **dict.fromkeys(("gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a"), (4, 75)),
-    **dict.fromkeys(("gd600", "gd3000"), (4, 75)),
+    # These do not say what they are, and others have a parameter where they have their state.
+    **dict.fromkeys(("gd600", "gd3000"), (6, 107)),
+    # An MD500 and a Sunfar have parameters up to FFFFH.
+    "vf-s15": (6, 103),
     **dict.fromkeys(("eds300", "sunfar-e300", "fc202"), (5, 90)),
     # One of these is also asked for 200BH, which a YL620 has: it would turn at ten times the speed.
     # And for 091BH, by which a GS2 runs, and for 2108H or 2105H: a VFD-B has both.
@@ -32,7 +35,7 @@ QUESTIONS = {
     "a1000": (8, 140),
     "j1000": (9, 158),
     # And these, and for 7000H: an MD500 has its setpoint where they take their commands.
-    **dict.fromkeys(("chf100a", "saj8000m"), (8, 135)),
+    **dict.fromkeys(("chf100a", "saj8000m"), (10, 171)),
     # An Altivar 600 is asked for CHCF, too: in its I/O profile 07H runs it. By the other two names nobody would ask it,
     # so one more word tells that they are none.
     **dict.fromkeys(("atv312", "atv12", "atv320", "atv600", "atv71"), (7, 120)),
@@ -43,7 +46,7 @@ QUESTIONS = {
     # And for its own 0013H and 001AH; register 1 is a parameter of Goodrives and others.
     "smd": (10, 172),
     "frenic": (9, 158),
-    "v20": (8, 140),
+    "v20": (9, 158),
     # A WJ200 has its direction where this one stops.
     "sj200": (7, 125),
     # It is commanded where Goodrives and others have parameters, some of them without a code.

@@ -242,8 +242,9 @@ impl Apart {
     /// A code and a signature say which family it is, so that only those count which would take harm. A state alone says
     /// little: whoever halts by other words counts.
     fn rivals<'a>(&self, taken: &Arc<Family>, live: &[&'a Arc<Family>], what: What) -> Vec<&'a Arc<Family>> {
-        // A parameter that has no row is as good for a rival as it is for this one.
-        let is_strict = self.explains(taken);
+        // A parameter that has no row is as good for a rival as it is for this one; and as good as a state, which alone may
+        // be any word.
+        let is_strict = self.explains(taken) && self.is_told(taken);
         let fits = |family: &Family| self.explains(family) || !is_strict && self.explains_by_rule(family);
         let others = live.iter().copied().filter(|family| !is_same(family, taken) && fits(family));
         if matches!(what, What::Word(_)) || self.is_told(taken) {

@@ -81,7 +81,7 @@ impl Family {
             telling,
             command_registers: command_registers(&profile),
             halts: HALTS.into_iter().filter_map(|command| profile.command(command)).collect(),
-            groups: profile.parameter_groups().collect(),
+            groups: profile.unlisted_groups().collect(),
             signature,
             profile,
             codes,

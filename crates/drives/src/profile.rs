@@ -259,7 +259,13 @@ impl Profile {
         (0..=LAST_NUMBER).filter(|&group| self.is_parameter_group(group))
     }
 
-    /// Whether `group` is one of them.
+    /// The high bytes of addresses at which the drive may have a parameter that has no row: those of the rule, and those
+    /// of which its file says so.
+    pub fn unlisted_groups(&self) -> impl Iterator<Item = u8> {
+        self.parameter_groups().chain(self.groups.unlisted.iter().copied())
+    }
+
+    /// Whether `group` is one that has the rule.
     pub(crate) fn is_parameter_group(&self, group: u8) -> bool {
         let is_register = |entry: &Entry| {
             let is_there = |place: Place| place.table == Table::Holding && place.address.to_be_bytes()[0] == group;

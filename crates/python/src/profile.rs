@@ -136,6 +136,10 @@ impl Profile {
         self.0.parameter_groups().map(u16::from).collect()
     }
 
+    fn unlisted_groups(&self) -> Vec<u16> {
+        self.0.unlisted_groups().map(u16::from).collect()
+    }
+
     #[pyo3(signature = (role, /))]
     fn role(&self, role: &Bound<'_, PyAny>) -> PyResult<Option<&str>> {
         Ok(self.0.role(&text("role", role)?).map(known_as))

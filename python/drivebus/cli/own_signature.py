@@ -74,7 +74,7 @@ def _others(written: Iterable[int]) -> Iterator[drivebus.Profile]:
 
 def _may_have(other: drivebus.Profile, place: int) -> bool:
     """Whether a unit of a family has a register or a parameter at *place*, as far as its profile tells."""
-    return other.name_at(place) is not None or place >> 8 in other.parameter_groups()
+    return other.name_at(place) is not None or place >> 8 in other.unlisted_groups()
 
 
 def _written(profile: drivebus.Profile) -> list[int]:

@@ -153,6 +153,10 @@ class Profile:
         """
         return self._native.parameter_groups()
 
+    def unlisted_groups(self) -> list[int]:
+        """The high bytes, 0..255, of addresses at which the drive may have a parameter without a row: with those of the rule."""
+        return self._native.unlisted_groups()
+
     def requests(self) -> RequestRules:
         """What else is known of requests."""
         from drivebus.profile.facts import RequestRules

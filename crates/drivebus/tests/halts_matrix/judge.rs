@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use drivebus::drives::{Command, Place, Profile, Table};
 use drivebus::rtu::Table as Written;
-use drivebus::sim::{SimulatedDrive, WriteRecord};
-use drivebus::{Bus, Error, ErrorKind};
+use drivebus::sim::{Side, SimulatedDrive, WriteRecord};
+use drivebus::{Bus, Error, ErrorKind, Instant};
 
+use super::NOT_COMMANDED;
 use super::plant::{LONG, Plant};
 
 /// They have no motor and no commands; the simulated ones take the stop of their maker.
@@ -46,6 +47,7 @@ impl Shaft {
 pub(crate) struct Judge<'p> {
     plant: &'p Plant,
     began: Shaft,
+    since: Instant,
     eeprom: u64,
     /// The worst that it did at any frame.
     seen: Arc<Mutex<Option<String>>>,
@@ -63,7 +65,7 @@ impl<'p> Judge<'p> {
                 found.lock().unwrap().get_or_insert(wrong);
             }
         })));
-        Self { plant, began, eeprom, seen }
+        Self { plant, began, since: plant.simulator.now(), eeprom, seen }
     }
 
     /// Whatever is wrong, now that the halt has ended with `came`.
@@ -81,6 +83,7 @@ impl<'p> Judge<'p> {
         if drive.eeprom_writes() != self.eeprom {
             wrong.push("its EEPROM was written".to_owned());
         }
+        wrong.extend(self.unlisted());
         let at_end = Shaft::of(&drive);
         wrong.extend(self.began.wrong(at_end));
         self.plant.pass(Duration::from_millis(300));
@@ -108,6 +111,23 @@ impl<'p> Judge<'p> {
             }
         }
         wrong
+    }
+
+    /// What was written where a drive of that family may have a parameter without a row: that the simulated one refuses it
+    /// proves nothing. Not asked of those without commands: whichever groups they have, no answer tells them.
+    fn unlisted(&self) -> Option<String> {
+        let profile = &self.plant.profile;
+        let may_keep = |frame: &[u8]| {
+            let &[_, 0x06 | 0x10, high, low, ..] = frame else { return None };
+            let address = u16::from_be_bytes([high, low]);
+            let plain = profile.stored_address(address).unwrap_or(address);
+            let is_in_group = profile.unlisted_groups().any(|group| group == plain.to_be_bytes()[0]);
+            (is_in_group && profile.entry_at(plain).is_none()).then_some(address)
+        };
+        let trace = self.plant.simulator.wire().trace();
+        let mut said = trace.iter().filter(|each| each.side == Side::Master && each.begin >= self.since);
+        let kept = said.find_map(|each| may_keep(&each.bytes)).filter(|_| !NOT_COMMANDED.contains(&profile.name()))?;
+        Some(format!("{kept:04X}H was written, where it may have a parameter"))
     }
 }
 

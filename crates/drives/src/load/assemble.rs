@@ -34,6 +34,9 @@ pub(super) fn profile(
         if let Some(closed) = &parameters.closed_groups {
             profile.groups.closed.clone_from(closed);
         }
+        if let Some(unlisted) = &parameters.unlisted_groups {
+            profile.groups.unlisted.clone_from(unlisted);
+        }
         if let Some(memory) = &parameters.memory {
             profile.memory = problems.keep(facts::memory(file, memory));
         }

@@ -197,6 +197,9 @@ pub(super) struct Parameters {
     pub(super) memory: Option<Placed<Memory>>,
     /// Groups that nobody may touch.
     pub(super) closed_groups: Option<Vec<u8>>,
+    /// High bytes of addresses at which the drive may have parameters that the file has no row of, and no rule finds. One too many
+    /// costs a question before a word meant for another drive; one too few may cost a parameter.
+    pub(super) unlisted_groups: Option<Vec<u8>>,
     /// Codes whose write does something, such as tuning the motor.
     pub(super) acts: Option<Vec<Placed<String>>>,
     /// Codes or groups (`P14`) that set the line: a restore leaves them alone unless asked.

@@ -93,6 +93,8 @@ pub(crate) struct Groups {
     pub(crate) listed: bool,
     /// Groups that the maker keeps closed.
     pub(crate) closed: Vec<u8>,
+    /// High bytes of addresses at which there are parameters without a row.
+    pub(crate) unlisted: Vec<u8>,
     /// Codes of rows that the profile dropped: its drives do not have them, not even as raw words.
     pub(crate) dropped: Vec<String>,
     /// Their write does something, and is not simply kept.
