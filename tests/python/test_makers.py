@@ -159,6 +159,19 @@ MAKERS = [
         sure=True,
         forward_alone="06 25 01 00 01",
     ),
+    # The same of its own manual; 00-05 is another.
+    Maker(
+        "f510",
+        prepare=("06 00 02 00 02", "06 00 05 00 03"),
+        forward=("10 25 01 00 02 04 00 01 07 d0",),
+        reverse="06 25 01 00 03",
+        stop="06 25 01 00 00",
+        reset="06 25 01 00 08",
+        fault=5,
+        shown="OL1",
+        sure=True,
+        forward_alone="06 25 01 00 01",
+    ),
     Maker(
         "saj8000m",
         hertz=None,

@@ -51,6 +51,15 @@ UNITS = {
             "frenic",
         ],
     ),
+    # The same, and those that have their command or setpoint at 1000H; the last takes the same words.
+    "f510": Unit(
+        [(0x0002, 2), (0x0005, 3)],
+        0x2501,
+        [
+            *("a1000", "j1000", "acs355", "acs580", "fr-d700", "v20", "chf100a", "h100", "gd350", "ms300", "md500"),
+            *("vfd500", "frenic", "saj8000m", "sunfar-e300", "vacon10", "smd", "e510"),
+        ],
+    ),
     # The first three have its status words.
     "gs2": Unit(
         [(0x0300, 3), (0x0400, 5)],

@@ -55,6 +55,7 @@ READ_ONLY = {
     ),
     **dict.fromkeys(["a1000", "j1000", "sj200"], 0x22),
     "e510": 0x05,
+    "f510": 0x04,
     "cfw500": 0x03,
     # Its manual (1755863, p. 39) refuses a write of ETA so.
     "atv71": 0x04,

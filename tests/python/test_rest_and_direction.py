@@ -121,6 +121,7 @@ def test_where_no_page_says_that_a_ramp_is_told_the_frequency_is_looked_at(famil
         "atv71",
         "cfw500",
         "e510",
+        "f510",
         "fc202",
         "fr-d700",
         "frenic",

@@ -65,6 +65,7 @@ FAMILIES = {
     49: "dc1",
     50: "smd",
     51: "nowforever",
+    52: "f510",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]

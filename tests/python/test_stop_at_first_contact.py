@@ -26,7 +26,9 @@ QUESTIONS = {
     "fc51": (6, 108),
     "yl620": (4, 75),
     # Where this one is commanded, a CHF100A or a VFD500 may have a parameter.
-    "e510": (5, 91),
+    # Both are asked for a parameter that the other has not.
+    "e510": (6, 109),
+    "f510": (6, 109),
     "gs2": (6, 108),
     "gs4": (6, 108),
     "md500": (5, 90),
@@ -34,8 +36,8 @@ QUESTIONS = {
     "fr-d700": (6, 112),
     "a1000": (8, 140),
     "j1000": (9, 158),
-    # And these, and for 7000H: an MD500 has its setpoint where they take their commands.
-    **dict.fromkeys(("chf100a", "saj8000m"), (10, 171)),
+    # And these, and for 7000H and 2520H: an MD500 has its setpoint, an F510 a parameter where they take their commands.
+    **dict.fromkeys(("chf100a", "saj8000m"), (11, 188)),
     # An Altivar 600 is asked for CHCF, too: in its I/O profile 07H runs it. By the other two names nobody would ask it,
     # so one more word tells that they are none.
     **dict.fromkeys(("atv312", "atv12", "atv320", "atv600", "atv71"), (7, 120)),

@@ -69,6 +69,7 @@ SILENT_ON_CODES = [
     "dc1",
     "sj200",
     "e510",
+    "f510",
     "cfw500",
     "smd",
     "nowforever",
@@ -85,6 +86,7 @@ SIGNED = [
     "vacon10",
     "smd",
     "nowforever",
+    "f510",
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -139,8 +141,9 @@ TAKEN_FOR: dict[str, list[str]] = {
     "dc1": ["dc1"],
     # And this one 0013H, 001AH and 0032H, and neither 080EH, 0502H nor an input register.
     "smd": ["smd"],
-    # And this one 2520H and 2524H.
+    # And this one 2520H and 2524H, and that one 1700H, too.
     "e510": ["e510"],
+    "f510": ["f510"],
     # And this one 091BH and 2104H, and that one 091BH and 091FH.
     "gs2": ["gs2"],
     "gs4": ["gs4"],

@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 51] = [
+static BUILTINS: [Builtin; 52] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -185,6 +185,7 @@ static BUILTINS: [Builtin; 51] = [
     builtin!("frenic": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("vf-s15": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("e510": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("f510": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gs2": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gs4": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("vacon10": "registers.csv" "parameters.csv" "faults.csv"),

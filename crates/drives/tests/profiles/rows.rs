@@ -222,6 +222,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("nowforever", 18),
         ("chv100", 24),
         ("e510", 68),
+        ("f510", 129),
         ("smd", 12),
         ("eds300", 17),
         ("fc51", 23),

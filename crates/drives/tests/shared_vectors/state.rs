@@ -107,6 +107,7 @@ fn of_the_shipped_profiles_only_six_words_say_two_things() {
                         "vf-s15",
                         "optidrive-e3",
                         "e510",
+                        "f510",
                         "cfw500",
                         "vacon10",
                         "dc1",

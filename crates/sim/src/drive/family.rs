@@ -21,6 +21,7 @@ mod cfw500;
 mod chf100a;
 mod e510;
 mod eds300;
+mod f510;
 mod fc202;
 mod fc51;
 mod fr_d700;
@@ -169,7 +170,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 51] = [
+const FAMILIES: [fn() -> Family; 52] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -213,6 +214,7 @@ const FAMILIES: [fn() -> Family; 51] = [
     vf_s15::vf_s15,
     frenic::frenic,
     e510::e510,
+    f510::f510,
     gs2::gs2,
     gs4::gs4,
     vacon::vacon10,

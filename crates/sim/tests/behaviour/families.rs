@@ -204,6 +204,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "fr-d700",
         "j1000",
         "e510",
+        "f510",
         "vf-s15",
         "cfw500",
         "nowforever",

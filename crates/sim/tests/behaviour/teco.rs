@@ -78,3 +78,42 @@ fn the_examples_of_its_addendum_set_parameters() {
     assert_eq!(bench.read::<1>(0x2520), [0x0004]);
     assert_eq!(bench.drive().eeprom_writes(), before + 2);
 }
+
+/// F510 communication addendum, pp. 1-5 to 1-7 and 1-42: the same words, obeyed with 00-05 = 3. Bit 14 of its state says that 00-02 does
+/// not obey the bus.
+#[test]
+fn an_f510_takes_the_words_of_an_e510() {
+    let mut bench = Bench::of("f510");
+    assert_eq!(bench.read::<1>(0x2520), [0x4004]);
+    go(&mut bench, "06 25 01 00 01");
+    assert_eq!(bench.read::<1>(0x2524), [0]);
+    go(&mut bench, "06 25 01 00 00");
+    asks(&mut bench, "06 00 02 00 02", "06 00 02 00 02");
+    asks(&mut bench, "06 00 05 00 03", "06 00 05 00 03");
+    go(&mut bench, "06 25 02 03 e8");
+    go(&mut bench, "06 25 01 00 03");
+    assert_eq!(bench.read::<5>(0x2520), [0x0007, 0, 0, 1_000, 1_000]);
+    go(&mut bench, "06 25 01 00 02");
+    assert_eq!(bench.read::<1>(0x2524), [0]);
+    bench.drive().trip(1).unwrap();
+    assert_eq!(bench.read::<2>(0x2520), [0x0008, 1]);
+    go(&mut bench, "06 25 01 00 08");
+    assert_eq!(bench.read::<2>(0x2520), [0x0004, 0]);
+}
+
+/// Pp. 1-4 and 1-14 to 1-24: its groups go up to 24, and those of an E510 to 14.
+#[test]
+fn an_f510_has_more_parameters() {
+    let mut bench = Bench::of("f510");
+    for last in ["00 38", "02 22", "0b 41", "0c 4c", "0e 2f", "10 25", "14 23", "17 3a", "18 06"] {
+        asks(&mut bench, &format!("03 {last} 00 01"), "03 02 00 00");
+    }
+    for none in ["00 39", "02 14", "0d 0e", "13 00", "17 3b", "18 07", "25 03", "25 2e"] {
+        asks(&mut bench, &format!("03 {none} 00 01"), "83 02");
+    }
+    asks(&mut bench, "06 25 02 9c 41", "86 04");
+    asks(&mut bench, "06 25 20 00 00", "86 04");
+    for group in ["14", "17"] {
+        asks(&mut Bench::of("e510"), &format!("03 {group} 00 00 01"), "83 02");
+    }
+}
