@@ -333,3 +333,35 @@ def test_a_parameter_may_be_the_end_of_a_range_if_there_is_such(tmp_path: Path, 
     (row,) = rows(tmp_path)
     known = high == "P00.03"
     assert (row["high_from"], row["note"]) == ((high, "") if known else ("", "the table has the range 0 to P09.99"))
+
+
+GOING_ON = [
+    ["No.", "Addr.", "Description", "Unit"],
+    ["", "", "of the drive", "or step"],
+    ["P00.01", "0001H", "Speed", "0.01 Hz"],
+    ["", "", "of the motor", ""],
+    ["", "", "in the field", ""],
+    ["", "1000H", "Torque", "0.1 %,"],
+    ["", "", "", "signed"],
+    ["P00.02", "0002H", "Current", "0.1 A"],
+]
+"""A table whose cells go on in the next line: below the titles, in one column, in another; and a row without a code."""
+
+
+@pytest.mark.parametrize("before", ["", "\n\n"])
+@pytest.mark.parametrize("form", ["bars", "bars that end early", "gaps"])
+def test_cells_go_on_in_the_same_way_however_a_table_is_pasted(form: str, before: str) -> None:
+    if form == "gaps":
+        lines = ["".join(cell.ljust(18) for cell in row).rstrip() for row in GOING_ON]
+    else:
+        lines = [f"| {' | '.join(row)} |" for row in GOING_ON]
+    if form == "bars that end early":
+        lines = [line.rstrip(" |") for line in lines]
+    table = ManualTable()
+    rows = table.read((before + "\n".join(lines)).encode(), "p. 1")
+    assert [(row.code, row.address, row.label, row.unit, row.scale, row.signed) for row in rows] == [
+        ("P00.01", 0x0001, "Speed of the motor in the field", "Hz", 100, False),
+        ("", 0x1000, "Torque", "%", 10, True),
+        ("P00.02", 0x0002, "Current", "A", 10, False),
+    ]
+    assert [said for _, said in table.left_out] == ['"" is no address of one register']
