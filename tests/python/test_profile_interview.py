@@ -40,8 +40,8 @@ P00.03  0003H    Maximum frequency  10.00-400.00                        50.00
 BY_TABLES = [
     *("Example Drives EX-1", "EX-1 manual, 3rd edition"),
     *("registers.csv", "41", "-", *PARAMETERS.splitlines(), ".", "42", "y", ""),
-    *("command", "41", "1", "2", "5", "6", "7", "y"),  # pages are offered again
-    *("speed_setpoint", "1100H", "", "number", "1", "2", "3", "4", "output_frequency", "1101H"),
+    *("command", "1", "2", "5", "6", "7", "41", "y"),
+    *("speed_setpoint", "1100H", "number", "1", "2", "3", "4", "43", "output_frequency", "1101H"),
     *("P00.01=2", "", "", "", "P00.03", "", "6", "12", "40", "9600 8N1 1", "39"),
 ]
 BY_HAND = [
@@ -371,8 +371,8 @@ LIST_OF_FAULTS = """\
 AS_PRINTED = [
     *("Corvan CV-2", "CV-2 supplement", "-", *PRINTED.splitlines(), ".", "6"),
     *("-", *SETTINGS.splitlines(), ".", "8", "y", ""),
-    *("control_word", "6", "bit 0 and bit 2", "bits 0, 1, 2", "bit 2", "0", "bits 2 7", "y"),
-    *("speed_reference", "status_word", "", "bits", "3=1", "1=1,2=0", "1=1,2=1", "1=0"),
+    *("control_word", "bit 0 and bit 2", "bits 0, 1, 2", "bit 2", "0", "bits 2 7", "y"),
+    *("speed_reference", "status_word", "bits", "3=1", "1=1,2=0", "1=1,2=1", "1=0"),
     *("output_frequency", "active_fault", "1-01=2", "1-02=3", "", "3-02", "3-05", "7-01", "7-02", "1", "", "2", "9"),
     *("-", *LIST_OF_FAULTS.splitlines(), ".", "11", "6, 16", "16", "4", "19200 8N1 5", "4"),
 ]
@@ -502,8 +502,8 @@ F4.20  0414H  Serial time-out    0.0 to 60.0 s, 0.0 is off     0.0
 BY_WORDS = [
     *("Ostrom OV3", "OV3 manual", "-", *IN_BARS.splitlines(), ".", "63"),
     *("-", *IN_GAPS.splitlines(), ".", "62", "y", ""),
-    *("Command", "", "0021H", "0022H", "0010H", "", "0080H", "y"),
-    *("Setpoint", "10000 = F1.04", "63", "State", "", "number", "1", "2", "0", "7"),
+    *("Command", "0021H", "0022H", "0010H", "", "0080H", "y"),
+    *("Setpoint", "10000 = F1.04", "63", "State", "number", "1", "2", "0", "7"),
     *("Output frequency", "Fault number", "F1.01=serial", "", "", "F4.20", "", "30", "F4.20"),
     *("", "6", "8", "61", "9600 8-N-1 3", "61"),
 ]
@@ -536,7 +536,9 @@ def test_what_a_table_has_beside_a_register_is_held_against_the_answers(there: P
     assert asked(other, [*BY_WORDS[:place], "33", *BY_WORDS[place + 1 :]]).exit_code == 0
     assert drivebus.Profile.load(other).commands() == profile.commands()
     willed = there.with_name("willed")
-    assert asked(willed, [*BY_WORDS[:place], "21", "y", *BY_WORDS[place + 1 :]]).exit_code == 0
+    after = BY_WORDS.index("0080H") + 1
+    own = [*BY_WORDS[:place], "21", "y", *BY_WORDS[place + 1 : after], "64", *BY_WORDS[after:]]
+    assert asked(willed, own).exit_code == 0
     assert drivebus.Profile.load(willed).commands()["run_forward"] == 21
 
 
@@ -551,7 +553,7 @@ Addr.  Description        Unit  Modif.
 @pytest.mark.parametrize(("said", "scale"), [("y", 1), ("n", 1), ("", 1)])
 def test_a_unit_without_a_step_is_asked_for(there: Path, said: str, scale: int) -> None:
     start = ["Arden A1", "A1 manual", "-", *WHOLE.splitlines(), ".", "3", said, ""]
-    done = asked(there, [*start, "Command", "3", "1", "", "0", "", "", "y", *[""] * 20])
+    done = asked(there, [*start, "Command", "1", "", "0", "", "", "3", "y", *[""] * 20])
     assert done.exit_code == 0, done.output
     question = "No step is printed of dc_bus_voltage in V, heat_sink in °C. Is one count of each 1?"
     assert question in " ".join(done.stderr.split())
@@ -615,8 +617,8 @@ HALDEN_TRIPS = """\
 ASKED_OF_HALDEN = [
     *("Halden HX20", "HX20-MB-EN 2.1", "-", *HALDEN.splitlines(), ".", "7", "y"),
     *("-", *HALDEN_SETTINGS.splitlines(), ".", "10", "y", ""),
-    *("drive_command", "7", "bits 0, 2", "bits 0, 1, 2", "bit 2", "0", "acknowledge=1", "y"),
-    *("frequency_target", "30201", "8", "bits", "7=1", "4=1, 5=0", "4=1, 5=1", "4=0"),
+    *("drive_command", "bits 0, 2", "bits 0, 1, 2", "bit 2", "0", "acknowledge=1", "y"),
+    *("frequency_target", "30201", "bits", "7=1", "4=1, 5=0", "4=1, 5=1", "4=0"),
     *("actual_frequency", "trip_number", "A.001=2", "", "A.011", "A.012", "A.030", "A.031", "1", "2", "0", "14"),
     *("-", *HALDEN_TRIPS.splitlines(), ".", "12", "6", "12", "5", "19200 8E1 11", "5"),
 ]
@@ -686,3 +688,54 @@ def test_a_value_that_the_table_calls_otherwise_is_asked_for_once_more(
     place = len(ASKED_OF_HALDEN) - 1 - ASKED_OF_HALDEN[::-1].index(before)
     done = asked(there, [*ASKED_OF_HALDEN[:place], wrong, "n", *ASKED_OF_HALDEN[place:]])
     assert (done.exit_code, said in " ".join(done.stderr.split())) == (0, True), done.output
+
+
+def test_no_page_is_taken_by_enter(there: Path) -> None:
+    pages = {"39", "40", "41", "42", "43"}
+    slips = [slip for answer in BY_TABLES for slip in ([""] if answer in pages else []) + [answer]]
+    done = asked(there, slips)
+    assert (done.exit_code, done.stderr.count("this is needed")) == (0, 6), done.output
+    other = there.with_name("other") / "ex"
+    other.parent.mkdir()
+    assert asked(other, BY_TABLES).exit_code == 0
+    assert (there / "profile.toml").read_bytes() == (other / "profile.toml").read_bytes()
+
+
+def test_the_page_before_is_taken_where_that_is_said(there: Path) -> None:
+    """The question shows which it is; the first one has none before it."""
+    assert AS_PRINTED[-4:] == ["16", "4", "19200 8N1 5", "4"]
+    done = asked(there, [*AS_PRINTED[:-1], "same"])
+    assert (done.exit_code, "Its page (same: 4)" in done.stderr) == (0, True), done.output
+    serial = drivebus.Profile.load(there).serial()
+    assert serial is not None
+    assert serial.source == "CV-2 supplement, p. 4"
+    place = AS_PRINTED.index("6")
+    done = asked(there.with_name("other"), [*AS_PRINTED[:place], "same", *AS_PRINTED[place:]])
+    assert (done.exit_code, '"same" is the page before, and there is none' in done.stderr) == (0, True), done.output
+
+
+@pytest.mark.parametrize(
+    ("answers", "word", "place", "source"),
+    [
+        # Each word is printed in the row of the register: as bits, as hexadecimal words, as numbers.
+        (AS_PRINTED, "", "commands", "CV-2 supplement, p. 6"),
+        (AS_PRINTED, "", "state", "CV-2 supplement, p. 6"),
+        (BY_WORDS, "", "commands", "OV3 manual, p. 63"),
+        (BY_WORDS, "", "state", "OV3 manual, p. 63"),
+        # One is not: its page is asked.
+        (AS_PRINTED, "bits 2 7", "commands", "CV-2 supplement, p. 77"),
+        (BY_WORDS, "0080H", "commands", "OV3 manual, p. 77"),
+    ],
+)
+def test_words_that_a_table_prints_are_on_its_page(
+    there: Path, answers: list[str], word: str, place: str, source: str
+) -> None:
+    if word:
+        at = answers.index(word)
+        other = ["bits 2 9"] if word.startswith("bit") else ["0081H", "y"]
+        answers = [*answers[:at], *other, "77", *answers[at + 1 :]]
+    done = asked(there, answers)
+    assert done.exit_code == 0, done.output
+    text = (there / "profile.toml").read_text(encoding="utf-8")
+    rules = next(part for part in text.split("\n\n") if part.startswith(f"[{place}]"))
+    assert f'source = "{source}"' in rules

@@ -14,27 +14,37 @@ from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["Pages", "TableQuestions", "content", "one_of"]
 
+_SAME = "same"
+
 
 class Pages:
-    """Where a manual prints what is answered; the page before is offered."""
+    """Where a manual prints what is answered. No page is taken by Enter; the one before has a word."""
 
     def __init__(self, dialogue: Dialogue, manual: str) -> None:
         self._dialogue = dialogue
         self._manual = manual
         self._page = ""
 
-    def source_of(self, row: TableRow) -> str:
-        """Where the words of a register are printed; one that no table has was just asked for its page."""
-        if not row.line:
-            return row.source
-        if row.source.startswith(f"{self._manual}, "):
-            self._page = row.source.removeprefix(f"{self._manual}, ").removeprefix("p. ")
-        return self.source("Page that says what its words mean")
+    def source_of(self, row: TableRow, *, is_printed: bool) -> str:
+        """Where the words of a register are printed; *is_printed* says that its own row does.
+
+        One that no table has was just asked for its page.
+        """
+        return row.source if is_printed or not row.line else self.source(f"Page that says what {row.name} means")
 
     def source(self, question: str = "Its page") -> str:
-        """Document and page; the page before is offered."""
-        self._page = self._dialogue.needed(question, values.plain, self._page or None)
+        """Document and page."""
+        same = f" ({_SAME}: {self._page})" if self._page else ""
+        self._page = self._dialogue.needed(f"{question}{same}", self._read)
         return f"{self._manual}, {f'p. {self._page}' if self._page.isdecimal() else self._page}"
+
+    def _read(self, text: str) -> str:
+        page = values.plain(text)
+        if page.lower() != _SAME:
+            return page
+        if not self._page:
+            raise WrongUse(f'"{_SAME}" is the page before, and there is none')
+        return self._page
 
 
 class TableQuestions:

@@ -5,7 +5,6 @@ Nothing is guessed: what the manual does not print is left out by Enter, and wha
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -17,6 +16,7 @@ from drivebus.cli.dialogue import Dialogue
 from drivebus.cli.interview_parameters import ParameterQuestions
 from drivebus.cli.interview_tables import Pages, TableQuestions, content, one_of
 from drivebus.cli.manual_cells import TableRow
+from drivebus.cli.printed_words import prints_bits, prints_words, words_of
 from drivebus.cli.profile_answers import Answers, Bits, Commands, Share, State
 from drivebus.cli.wrong_use import WrongUse
 
@@ -126,7 +126,6 @@ class _Interview:
         if register is None:
             return None
         _allow(register, "wo")
-        source = self._pages.source_of(register)
         words: dict[str, int] = {}
         elsewhere: dict[str, tuple[TableRow, int]] = {}
         for command, question in _COMMANDS.items():
@@ -148,6 +147,8 @@ class _Interview:
         _widen(register, [*words.values()])
         said = (f"{command.replace('_', ' ')} {word:04X}H" for command, word in words.items())
         self._dialogue.say(f"{register.name} ({tables.shown(register.address)}) takes {', '.join(said)}.")
+        told = prints_words(register, words.values())
+        source = self._pages.source_of(register, is_printed=told)
         is_printed = self._dialogue.agreed("Are these words in the manual of this very drive?", default=True)
         return Commands(register, words, elsewhere, is_printed, source)
 
@@ -155,16 +156,17 @@ class _Interview:
         register = self._register("Register that tells what the motor does", "What the motor does", "ro", set())
         if register is None:
             return None
-        source = self._pages.source_of(register)
         register.scale = 1
         how = self._dialogue.needed(
             "It tells by one number for each state, or by bits (number, bits)", one_of(("number", "bits"))
         )
         if how == "number":
             numbers = self._each_state(_STATES, "Number", values.word)
-            return State(register, numbers, {}, source) if numbers else None
+            told = prints_words(register, numbers.values())
+            return State(register, numbers, {}, self._pages.source_of(register, is_printed=told)) if numbers else None
         bits = self._each_state(_BY_BITS, "Bits, such as 0=1, 4-3=2,", values.bits, _is_shown)
-        return State(register, {}, bits, source) if bits else None
+        told = prints_bits(register, [field for each in bits.values() for field in each])
+        return State(register, {}, bits, self._pages.source_of(register, is_printed=told)) if bits else None
 
     def _take_speed(self, row: TableRow) -> Share | None:
         """What a count of the setpoint is. Where it is a share of a frequency, of which."""
@@ -203,8 +205,7 @@ class _Interview:
     def _printed(self, row: TableRow, words: Mapping[str, int]) -> Callable[[str], int]:
         """What reads a word of a command; it asks once more where the table has words, and not this one."""
         told = " ".join(row.notes)
-        printed = re.findall(r"\b([0-9A-Fa-f]{1,4})[Hh]\b|\b0x([0-9A-Fa-f]{1,4})\b", told)
-        numbers = {int(one or other, 16) for one, other in printed}
+        numbers = words_of(row) if told else set()
         new = values.new(words, values.command_word)
 
         def read(text: str) -> int:
@@ -282,7 +283,7 @@ class _Interview:
         named = self.table.called(place) if equals else register
         address = named.address if named is not None else values.place(place)[1]
         if address == register.address:
-            return register, values.new(words, values.command_word)(said)
+            return register, self._printed(register, words)(said)
         word = values.command_word(said)
         row = self.table.at(address) or self.table.add(address, "Fault reset", self._pages.source())
         _allow(row, "wo")
