@@ -88,6 +88,11 @@ class Dialogue:
         if not self.agreed(question, default=False):
             raise WrongUse(else_said)
 
+    def meant(self, told: str, text: str) -> None:
+        """Asks whether an answer is meant, where the table has what was *told*."""
+        question = f"{told[:1].upper()}{told[1:]}. Is it {text} all the same?"
+        self.insisted(question, f"{text} is not what the table says")
+
     def pasted(self) -> str:
         """Lines of the input, until a dot stands alone in one."""
         if self._place == len(self._given):

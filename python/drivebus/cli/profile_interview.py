@@ -5,42 +5,24 @@ Nothing is guessed: what the manual does not print is left out by Enter, and wha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import TypeVar
 
-from drivebus import tables
 from drivebus.cli import answer_values as values
 from drivebus.cli.dialogue import Dialogue
+from drivebus.cli.interview_commands import CommandQuestions
 from drivebus.cli.interview_parameters import ParameterQuestions
-from drivebus.cli.interview_tables import Pages, TableQuestions, content, one_of
+from drivebus.cli.interview_registers import FAULT, FREQUENCY, SETPOINT, RegisterQuestions, allow
+from drivebus.cli.interview_state import StateQuestions
+from drivebus.cli.interview_tables import Pages, TableQuestions, content
 from drivebus.cli.manual_cells import TableRow
-from drivebus.cli.printed_words import prints_bits, prints_words, words_of
-from drivebus.cli.profile_answers import Answers, Bits, Commands, Share, State
+from drivebus.cli.profile_answers import Answers, Share
 from drivebus.cli.wrong_use import WrongUse
 
 __all__ = ["ask"]
 
 T = TypeVar("T")
-
-_COMMANDS = {
-    "run_forward": "Word that runs the motor forward (clockwise; look which way it turns)",
-    "run_reverse": "Word that runs it in reverse",
-    "stop": "Word that stops it along its ramp",
-    "coast": "Word that lets it coast",
-}
-_RESET = "Word that resets a fault; ADDRESS=WORD if it goes elsewhere, such as 2002H=2"
-_STATES = {
-    "forward": "while it runs forward",
-    "reverse": "while it runs in reverse",
-    "running": "while it runs, whichever way",
-    "stopped": "while it stands still",
-    "fault": "while it has a fault",
-}
-_SPEED_UNITS = {"Hz", "%", "rpm"}
-_BY_BITS = ("fault", "forward", "reverse", "running", "stopped")
-"""Of those that fit, the first counts, where none is a running motor."""
 
 
 def ask(table: Path | None, source: str | None, count: str | None) -> Answers:
@@ -79,23 +61,25 @@ class _Interview:
         self.tables = TableQuestions(dialogue, self._pages)
         self.table = self.tables.table
         self._parameters = ParameterQuestions(dialogue, self._pages, self.table)
-        self._used: list[TableRow] = []
+        self._registers = RegisterQuestions(dialogue, self._pages, self.table)
+        self._commands = CommandQuestions(dialogue, self._pages, self._registers)
+        self._state = StateQuestions(dialogue, self._pages, self._registers)
 
     def fill(self, answers: Answers) -> None:
         """Asks for all that makes the drive known by name."""
-        answers.commands = self._commands()
-        answers.setpoint = self._register("Register that takes the speed", "Speed setpoint", "rw", _SPEED_UNITS)
+        answers.commands = self._commands.commands()
+        answers.setpoint = self._registers.named(SETPOINT)
         if answers.setpoint is not None:
             answers.is_read_back = bool(answers.setpoint.line) and answers.setpoint.access == "rw"
             answers.share = self._take_speed(answers.setpoint)
             if answers.setpoint.scale is None and answers.share is None:
                 self._dialogue.say("Then its speed cannot be set by name.")
                 answers.setpoint = None
-        answers.state = self._state()
-        answers.frequency = self._register("Register that tells the output frequency", "Output frequency", "ro", {"Hz"})
+        answers.state = self._state.state()
+        answers.frequency = self._registers.named(FREQUENCY)
         if answers.frequency is not None and not self._parameters.counts(answers.frequency, "Hz", "it"):
             answers.frequency = None
-        answers.fault = self._register("Register that tells the number of a fault", "Fault", "ro", set())
+        answers.fault = self._registers.named(FAULT)
         if answers.fault is not None and answers.fault.scale is None:
             answers.fault.scale = 1
         answers.control.extend(self._parameters.control())
@@ -121,56 +105,9 @@ class _Interview:
         self._dialogue.say(f"Faults: {said}.")
         return found
 
-    def _commands(self) -> Commands | None:
-        register = self._register("Register that takes run and stop", "Command to the motor", "wo", set())
-        if register is None:
-            return None
-        _allow(register, "wo")
-        words: dict[str, int] = {}
-        elsewhere: dict[str, tuple[TableRow, int]] = {}
-        for command, question in _COMMANDS.items():
-            word = self._dialogue.optional(question, self._printed(register, words))
-            if word is not None:
-                words[command] = word
-        reset = self._dialogue.optional(_RESET, lambda text: self._reset(text, register, words))
-        if reset is not None:
-            row, word = reset
-            if row is register:
-                words["reset_fault"] = word
-            else:
-                elsewhere["reset_fault"] = reset
-        if not words:
-            self._dialogue.say("Then it is not told anything by name.")
-            return None
-        if "run_forward" in words and not {"stop", "coast"} & set(words):
-            self._dialogue.say("Without a stop and a coast it is not started by name.")
-        _widen(register, [*words.values()])
-        said = (f"{command.replace('_', ' ')} {word:04X}H" for command, word in words.items())
-        self._dialogue.say(f"{register.name} ({tables.shown(register.address)}) takes {', '.join(said)}.")
-        told = prints_words(register, words.values())
-        source = self._pages.source_of(register, is_printed=told)
-        is_printed = self._dialogue.agreed("Are these words in the manual of this very drive?", default=True)
-        return Commands(register, words, elsewhere, is_printed, source)
-
-    def _state(self) -> State | None:
-        register = self._register("Register that tells what the motor does", "What the motor does", "ro", set())
-        if register is None:
-            return None
-        register.scale = 1
-        how = self._dialogue.needed(
-            "It tells by one number for each state, or by bits (number, bits)", one_of(("number", "bits"))
-        )
-        if how == "number":
-            numbers = self._each_state(_STATES, "Number", values.word)
-            told = prints_words(register, numbers.values())
-            return State(register, numbers, {}, self._pages.source_of(register, is_printed=told)) if numbers else None
-        bits = self._each_state(_BY_BITS, "Bits, such as 0=1, 4-3=2,", values.bits, _is_shown)
-        told = prints_bits(register, [field for each in bits.values() for field in each])
-        return State(register, {}, bits, self._pages.source_of(register, is_printed=told)) if bits else None
-
     def _take_speed(self, row: TableRow) -> Share | None:
         """What a count of the setpoint is. Where it is a share of a frequency, of which."""
-        _allow(row, "rw")
+        allow(row, "rw")
         if row.unit == "Hz" and row.scale is not None:
             return None
         question = "One count of it is, such as 0.01 Hz; or counts that are a frequency, 10000 = P00.03"
@@ -199,108 +136,8 @@ class _Interview:
         """What was *said* of a count, as *text*; asked once more where the table has a share, and that is none."""
         told = next((note for note in row.notes if "%" in note), None)
         if told is not None and isinstance(said, Fraction):
-            self._is_meant(told, text)
+            self._dialogue.meant(told, text)
         return said
-
-    def _printed(self, row: TableRow, words: Mapping[str, int]) -> Callable[[str], int]:
-        """What reads a word of a command; it asks once more where the table has words, and not this one."""
-        told = " ".join(row.notes)
-        numbers = words_of(row) if told else set()
-        new = values.new(words, values.command_word)
-
-        def read(text: str) -> int:
-            word = new(text)
-            if numbers and word not in numbers:
-                self._is_meant(told, text)
-            return word
-
-        return read
-
-    def _is_meant(self, told: str, text: str) -> None:
-        question = f"{told[:1].upper()}{told[1:]}. Is it {text} all the same?"
-        self._dialogue.insisted(question, f"{text} is not what the table says")
-
-    def _each_state(
-        self,
-        states: Iterable[str],
-        question: str,
-        read: Callable[[str], T],
-        check: Callable[[str, T, Mapping[str, T]], None] = lambda _state, _told, _known: None,
-    ) -> dict[str, T]:
-        """What tells each of *states*, where *check* agrees.
-
-        Who has named a direction is not asked for a state without one.
-        """
-        known: dict[str, T] = {}
-        new = values.new(known, read)
-        for state in states:
-            if state == "running" and {"forward", "reverse"} & set(known):
-                continue
-
-            def checked(text: str, state: str = state) -> T:
-                told = new(text)
-                check(state, told, known)
-                return told
-
-            told = self._dialogue.optional(f"{question} {_STATES[state]}", checked)
-            if told is not None:
-                known[state] = told
-        return known
-
-    def _register(self, question: str, label: str, access: str, units: set[str]) -> TableRow | None:
-        """The row that is named by its name or address; one that no table has is made. It is in none but *units*."""
-        question = f"{question}: name or address, such as 2000H"
-        found = self._dialogue.optional(question, lambda text: self._free(text, units))
-        if isinstance(found, int):
-            found = self.table.add(found, label, self._pages.source())
-        if found is not None:
-            self._used.append(found)
-        if found is not None and found.access == "unknown":
-            found.access = access
-        return found
-
-    def _free(self, text: str, units: set[str]) -> TableRow | int:
-        found = self._known_or_place(text)
-        if isinstance(found, TableRow) and found.unit and found.unit not in units:
-            raise WrongUse(f"{found.name} is in {found.unit}, by its table: it cannot be this")
-        if any(found is row for row in self._used):
-            raise WrongUse(f"{text} is the register of another answer")
-        return found
-
-    def _known_or_place(self, text: str) -> TableRow | int:
-        row = self.table.called(text)
-        if row is not None:
-            return row
-        table, address = values.place(text)
-        row = self.table.at(address, table)
-        if row is None and table != "holding":
-            raise WrongUse(f'no table has "{text}", which is an input register')
-        return address if row is None else row
-
-    def _reset(self, text: str, register: TableRow, words: Mapping[str, int]) -> tuple[TableRow, int]:
-        """A word that means one thing only to *register*, or another register and its word."""
-        place, equals, said = (part.strip() for part in text.rpartition("="))
-        named = self.table.called(place) if equals else register
-        address = named.address if named is not None else values.place(place)[1]
-        if address == register.address:
-            return register, self._printed(register, words)(said)
-        word = values.command_word(said)
-        row = self.table.at(address) or self.table.add(address, "Fault reset", self._pages.source())
-        _allow(row, "wo")
-        _widen(row, [word])
-        return row, word
-
-
-def _is_shown(state: str, told: Bits, known: Mapping[str, Bits]) -> None:
-    """That *told* leaves each state to be told: the first of *known* that fits is the one that counts."""
-    for other, bits in known.items():
-        shown = ", ".join(
-            f"{high}={value}" if high == low else f"{high}-{low}={value}" for (high, low), value in bits.items()
-        )
-        if bits.items() <= told.items():
-            raise WrongUse(f"{other} is told by {shown}, and so {state} would never be. Which bit is another one then?")
-        if state == "stopped" and told.items() <= bits.items():
-            raise WrongUse(f"a motor that runs {other} shows that too ({shown})")
 
 
 def _most_words(text: str) -> int:
@@ -308,18 +145,3 @@ def _most_words(text: str) -> int:
     if not 1 <= count <= 125:
         raise WrongUse(f"{count} is not in the range from 1 to 125")
     return count
-
-
-def _allow(row: TableRow, access: str) -> None:
-    """That *row* can be written, whatever its table says of it."""
-    if row.access in {"ro", "unknown"}:
-        if row.access == "ro":
-            row.notes.append("the table says that it is read only")
-        row.access = access
-
-
-def _widen(row: TableRow, words: list[int]) -> None:
-    """The words of commands are whole numbers; a range of the table that is without them goes to the note."""
-    row.unit, row.scale = "", 1
-    if (row.low or row.high) and not all(float(row.low or 0) <= word <= float(row.high or 0xFFFF) for word in words):
-        row.without_range()

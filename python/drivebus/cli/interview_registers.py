@@ -1,0 +1,92 @@
+"""The questions for registers: which one it is, and what it must allow."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from drivebus.cli import answer_values as values
+from drivebus.cli.dialogue import Dialogue
+from drivebus.cli.interview_tables import Pages
+from drivebus.cli.manual_cells import TableRow
+from drivebus.cli.manual_table import ManualTable
+from drivebus.cli.wrong_use import WrongUse
+
+__all__ = ["COMMAND", "FAULT", "FREQUENCY", "SETPOINT", "STATE", "RegisterQuestions", "allow", "widen"]
+
+
+class Role(NamedTuple):
+    """What a register is asked for.
+
+    Attributes:
+        question: What it is, as it is asked.
+        label: What one is called that no table has.
+        access: How it is taken where its table does not tell.
+        units: What it may count in.
+    """
+
+    question: str
+    label: str
+    access: str
+    units: frozenset[str] = frozenset()
+
+
+COMMAND = Role("Register that takes run and stop", "Command to the motor", "wo")
+SETPOINT = Role("Register that takes the speed", "Speed setpoint", "rw", frozenset({"Hz", "%", "rpm"}))
+STATE = Role("Register that tells what the motor does", "What the motor does", "ro")
+FREQUENCY = Role("Register that tells the output frequency", "Output frequency", "ro", frozenset({"Hz"}))
+FAULT = Role("Register that tells the number of a fault", "Fault", "ro")
+
+
+class RegisterQuestions:
+    """Asks for rows of *table*, and adds to it what it has not."""
+
+    def __init__(self, dialogue: Dialogue, pages: Pages, table: ManualTable) -> None:
+        self.table = table
+        self._dialogue = dialogue
+        self._pages = pages
+        self._used: list[TableRow] = []
+
+    def named(self, role: Role) -> TableRow | None:
+        """The row that is named by its name or address; one that no table has is made."""
+        question = f"{role.question}: name or address, such as 2000H"
+        found = self._dialogue.optional(question, lambda text: self._free(text, role))
+        if found is None:
+            return None
+        row = self.table.add(found, role.label, self._pages.source()) if isinstance(found, int) else found
+        self._used.append(row)
+        if row.access == "unknown":
+            row.access = role.access
+        return row
+
+    def _free(self, text: str, role: Role) -> TableRow | int:
+        found = self._known_or_place(text)
+        if isinstance(found, TableRow) and found.unit and found.unit not in role.units:
+            raise WrongUse(f"{found.name} is in {found.unit}, by its table: it cannot be this")
+        if any(found is row for row in self._used):
+            raise WrongUse(f"{text} is the register of another answer")
+        return found
+
+    def _known_or_place(self, text: str) -> TableRow | int:
+        row = self.table.called(text)
+        if row is not None:
+            return row
+        table, address = values.place(text)
+        row = self.table.at(address, table)
+        if row is None and table != "holding":
+            raise WrongUse(f'no table has "{text}", which is an input register')
+        return address if row is None else row
+
+
+def allow(row: TableRow, access: str) -> None:
+    """That *row* can be written, whatever its table says of it."""
+    if row.access in {"ro", "unknown"}:
+        if row.access == "ro":
+            row.notes.append("the table says that it is read only")
+        row.access = access
+
+
+def widen(row: TableRow, words: list[int]) -> None:
+    """The words of commands are whole numbers; a range of the table that is without them goes to the note."""
+    row.unit, row.scale = "", 1
+    if (row.low or row.high) and not all(float(row.low or 0) <= word <= float(row.high or 0xFFFF) for word in words):
+        row.without_range()
