@@ -20,6 +20,9 @@ from hypothesis import strategies as st
 import drivebus
 from drivebus import Simulator
 from drivebus.cli import cli
+from drivebus.cli.interview_registers import FAULT, FREQUENCY, SETPOINT, STATE
+from drivebus.cli.manual_cells import TableRow
+from drivebus.cli.row_kinds import against
 
 from .conftest import NO_PTY
 
@@ -457,8 +460,6 @@ def test_an_answer_is_taken_back(there: Path) -> None:
 @pytest.mark.parametrize(
     ("question", "wrong", "said"),
     [
-        ("active_fault", "output_current", "output_current is in A, by its table: it cannot be this"),
-        ("status_word", "output_frequency", "output_frequency is in Hz, by its table"),
         ("bit 2", "bit 16", "a word has the bits 0 to 15"),
         ("6, 16", "6, 5", 'is neither 6, 16 nor "6, 16"'),
     ],
@@ -739,3 +740,89 @@ def test_words_that_a_table_prints_are_on_its_page(
     text = (there / "profile.toml").read_text(encoding="utf-8")
     rules = next(part for part in text.split("\n\n") if part.startswith(f"[{place}]"))
     assert f'source = "{source}"' in rules
+
+
+UNITLESS = """\
+Address,Name,R/W
+1000H,Command,W
+1001H,Frequency command,R/W
+1002H,Highest frequency,R/W
+1100H,Operation status,R
+1101H,Fault number,R
+1102H,Status of digital inputs,R
+1200H,Output frequency,R
+1201H,Output current,R
+1202H,Reference frequency,R
+"""
+SILENT = """\
+Code    Address  Name               Range                Change
+P00.03  0003H    Maximum frequency  10.00-400.00 Hz      stop
+P00.11  000BH    Acceleration time  0.1-600.0 s          run
+P00.12  000CH    Deceleration time  0.1-600.0 s          run
+P05.01  0501H    Torque limit       0.0-200.0 %          stop
+P05.02  0502H    Bus time-out       0.1-60.0 s           stop
+"""
+UNDER_WRONG_NAMES = [
+    *("Vestby V1", "V1 manual", "-", *UNITLESS.splitlines(), ".", "41", "-", *SILENT.splitlines(), ".", "42", "y", ""),
+    *("1000H", "1", "2", "5", "", "7", "43", "y"),
+    *("1001H", "0.01 Hz", "1100H", "number", "1", "2", "3", "4", "43"),
+    *("1200H", "0.01 Hz", "1101H", "", "P00.12", "P00.03", "P05.02", "", "", "", "6", "1", ""),
+]
+
+
+@pytest.mark.parametrize(
+    ("meant", "wrong", "said"),
+    [
+        ("1000H", "1001H", 'The table calls 1001H "Frequency command". Is it the register that takes run'),
+        ("1000H", "operation_status", 'The table calls 1100H "Operation status"'),
+        ("7", "1201H=1", 'The table calls 1201H "Output current". Is it the register that resets a fault'),
+        ("7", "1101H=1", 'The table calls 1101H "Fault number"'),
+        ("1001H", "1200H", 'The table calls 1200H "Output frequency". Is it the register that takes the speed'),
+        ("1001H", "1002H", 'The table calls 1002H "Highest frequency"'),
+        ("1100H", "1102H", 'The table calls 1102H "Status of digital inputs"'),
+        ("1100H", "1101H", 'The table calls 1101H "Fault number"'),
+        ("1200H", "1201H", 'The table calls 1201H "Output current". Is it the register that tells the out'),
+        ("1200H", "1202H", 'The table calls 1202H "Reference frequency"'),
+        ("1101H", "1201H", 'The table calls 1201H "Output current"'),
+        ("P00.12", "P00.11", 'The table calls 000BH "Acceleration time". Is it the parameter with the'),
+        ("P00.12", "P00.03", "P00.03 is in Hz, by its table. Is it the parameter with the time"),
+        ("P00.03", "P05.01", "P05.01 is in %, by its table. Is it the parameter with the frequency"),
+        ("P05.02", "P00.12", 'The table calls 000CH "Deceleration time". Is it the parameter with the time'),
+    ],
+)
+def test_what_the_table_calls_otherwise_is_insisted_on(there: Path, meant: str, wrong: str, said: str) -> None:
+    place = UNDER_WRONG_NAMES.index(meant)
+    done = asked(there, [*UNDER_WRONG_NAMES[:place], wrong, "", *UNDER_WRONG_NAMES[place:]])
+    assert done.exit_code == 0, done.output
+    assert said in " ".join(done.stderr.split())
+    other = there.with_name("other") / "ex"
+    other.parent.mkdir()
+    plain = asked(other, UNDER_WRONG_NAMES)
+    assert (plain.exit_code, "all the same" in plain.stderr) == (0, False), plain.output
+    assert (there / "profile.toml").read_bytes() == (other / "profile.toml").read_bytes()
+
+
+def test_a_unit_that_the_table_has_wrong_is_left_to_the_note(there: Path) -> None:
+    """A misprint in a table: who means the row says so, and says what one count is."""
+    (there.parent / "registers.csv").write_text(REGISTERS.replace("frequency,0.01Hz,R\n", "frequency,0.1A,R\n"))
+    place = BY_TABLES.index("output_frequency") + 1
+    done = asked(there, [*BY_TABLES[:place], "y", "0.01 Hz", *BY_TABLES[place:]])
+    assert (done.exit_code, "output_frequency is in A, by its table. Is it" in done.stderr) == (0, True), done.output
+    row = drivebus.Profile.load(there).describe("output_frequency")
+    assert (row.unit, row.scale, row.note) == ("Hz", 100, "the table has 'A' as its unit")
+
+
+def test_makers_names_for_the_same_thing_are_taken() -> None:
+    """The rows of the known families, each under the role that it has there."""
+    kinds = {"state": STATE, "frequency": FREQUENCY, "fault": FAULT, "setpoints.frequency": SETPOINT}
+    asked_for = set()
+    for family in drivebus.profiles():
+        profile = drivebus.Profile.builtin(family)
+        for name, role in kinds.items():
+            row = profile.role(name)
+            if row is not None:
+                label = profile.describe(row).label
+                if against(TableRow(1, 0, "holding", row, label), role.kind, ()):
+                    asked_for.add(label)
+    # Of a drive with a protocol of its own the frequency tells the state; of two the state has the fault in it.
+    assert asked_for == {"Output frequency", "What the drive does, and the number of its fault"}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from drivebus import tables
 from drivebus.cli import answer_values as values
 from drivebus.cli.dialogue import Dialogue
-from drivebus.cli.interview_registers import COMMAND, RegisterQuestions, allow, widen
+from drivebus.cli.interview_registers import COMMAND, RegisterQuestions, allow, insist, widen
 from drivebus.cli.interview_tables import Pages
 from drivebus.cli.manual_cells import TableRow
 from drivebus.cli.printed_words import prints_words, words_of
@@ -86,9 +86,10 @@ class CommandQuestions:
         if address == register.address:
             return register, self._printed(register, words)(said)
         word = values.command_word(said)
-        row = self._registers.table.at(address) or self._registers.table.add(
-            address, "Fault reset", self._pages.source()
-        )
+        known = self._registers.table.at(address)
+        if known is not None:
+            insist(self._dialogue, known, "Register that resets a fault", "command", ())
+        row = known or self._registers.table.add(address, "Fault reset", self._pages.source())
         allow(row, "wo")
         widen(row, [word])
         return row, word

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from drivebus.cli import answer_values as values
 from drivebus.cli.dialogue import Dialogue
+from drivebus.cli.interview_registers import insist
 from drivebus.cli.interview_tables import Pages
 from drivebus.cli.manual_cells import TableRow
 from drivebus.cli.manual_table import ManualTable
@@ -70,10 +71,10 @@ class ParameterQuestions:
 
     def ramp(self) -> Ramp | None:
         """What tells how long a stop takes, so that it is known when the motor should stand."""
-        time = self._dialogue.optional("Parameter with the time of the ramp of a stop, in seconds", self.parameter)
+        time = self._named("Parameter with the time in seconds of the ramp of a stop", "stop time", {"s", "ms", "min"})
         if time is None:
             return None
-        start = self._dialogue.optional("Parameter with the frequency which that time begins from", self.parameter)
+        start = self._named("Parameter with the frequency which that time begins from", "frequency", {"Hz"})
         if start is None or not (self.counts(time, "s", time.code) and self.counts(start, "Hz", start.code)):
             self._dialogue.say("Then a stop waits for standstill, however long that is.")
             return None
@@ -81,7 +82,7 @@ class ParameterQuestions:
 
     def watchdog(self) -> Watchdog | None:
         """What the drive does of its own where the bus is silent."""
-        timeout = self._dialogue.optional("Parameter with the time after which it acts on a silent bus", self.parameter)
+        timeout = self._named("Parameter with the time after which it acts on a silent bus", "time", {"s", "ms", "min"})
         if timeout is None or not self.counts(timeout, "s", timeout.code):
             return None
         action = self._dialogue.optional("Parameter that says what it does then", self.parameter)
@@ -148,6 +149,16 @@ class ParameterQuestions:
             row.access = "run"
         for row in unknown.values():
             row.access = "stop" if row.access == "unknown" else row.access
+
+    def _named(self, question: str, kind: str, units: set[str]) -> TableRow | None:
+        """The parameter that is named, whose name and unit do not speak against it, or it is meant all the same."""
+
+        def read(text: str) -> TableRow:
+            row = self.parameter(text)
+            insist(self._dialogue, row, question, kind, units)
+            return row
+
+        return self._dialogue.optional(question, read)
 
     def parameter(self, text: str) -> TableRow:
         """A parameter by its code, or by the name or the address of its row."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 from drivebus.cli import answer_values as values
@@ -9,9 +10,10 @@ from drivebus.cli.dialogue import Dialogue
 from drivebus.cli.interview_tables import Pages
 from drivebus.cli.manual_cells import TableRow
 from drivebus.cli.manual_table import ManualTable
+from drivebus.cli.row_kinds import against
 from drivebus.cli.wrong_use import WrongUse
 
-__all__ = ["COMMAND", "FAULT", "FREQUENCY", "SETPOINT", "STATE", "RegisterQuestions", "allow", "widen"]
+__all__ = ["COMMAND", "FAULT", "FREQUENCY", "SETPOINT", "STATE", "RegisterQuestions", "allow", "insist", "widen"]
 
 
 class Role(NamedTuple):
@@ -19,22 +21,24 @@ class Role(NamedTuple):
 
     Attributes:
         question: What it is, as it is asked.
+        kind: What its name may say, as `row_kinds` has it.
         label: What one is called that no table has.
         access: How it is taken where its table does not tell.
         units: What it may count in.
     """
 
     question: str
+    kind: str
     label: str
     access: str
     units: frozenset[str] = frozenset()
 
 
-COMMAND = Role("Register that takes run and stop", "Command to the motor", "wo")
-SETPOINT = Role("Register that takes the speed", "Speed setpoint", "rw", frozenset({"Hz", "%", "rpm"}))
-STATE = Role("Register that tells what the motor does", "What the motor does", "ro")
-FREQUENCY = Role("Register that tells the output frequency", "Output frequency", "ro", frozenset({"Hz"}))
-FAULT = Role("Register that tells the number of a fault", "Fault", "ro")
+COMMAND = Role("Register that takes run and stop", "command", "Command to the motor", "wo")
+SETPOINT = Role("Register that takes the speed", "setpoint", "Speed setpoint", "rw", frozenset({"Hz", "%", "rpm"}))
+STATE = Role("Register that tells what the motor does", "state", "What the motor does", "ro")
+FREQUENCY = Role("Register that tells the output frequency", "speed", "Output frequency", "ro", frozenset({"Hz"}))
+FAULT = Role("Register that tells the number of a fault", "fault", "Fault", "ro")
 
 
 class RegisterQuestions:
@@ -56,14 +60,16 @@ class RegisterQuestions:
         self._used.append(row)
         if row.access == "unknown":
             row.access = role.access
+        if row.unit and row.unit not in role.units:
+            row.without_unit()
         return row
 
     def _free(self, text: str, role: Role) -> TableRow | int:
         found = self._known_or_place(text)
-        if isinstance(found, TableRow) and found.unit and found.unit not in role.units:
-            raise WrongUse(f"{found.name} is in {found.unit}, by its table: it cannot be this")
         if any(found is row for row in self._used):
             raise WrongUse(f"{text} is the register of another answer")
+        if isinstance(found, TableRow):
+            insist(self._dialogue, found, role.question, role.kind, role.units)
         return found
 
     def _known_or_place(self, text: str) -> TableRow | int:
@@ -75,6 +81,20 @@ class RegisterQuestions:
         if row is None and table != "holding":
             raise WrongUse(f'no table has "{text}", which is an input register')
         return address if row is None else row
+
+
+def insist(dialogue: Dialogue, row: TableRow, question: str, kind: str, units: Collection[str]) -> None:
+    """Asks whether *row* is meant, where its name or its unit says that it is something else.
+
+    Raises:
+        WrongUse: It is not.
+    """
+    told = against(row, kind, units)
+    if told is not None:
+        what = f"{question[0].lower()}{question[1:]}"
+        dialogue.insisted(
+            f"{told}. Is it the {what} all the same?", f"then {row.code or row.name} is not what was asked"
+        )
 
 
 def allow(row: TableRow, access: str) -> None:

@@ -144,6 +144,13 @@ class TableRow:
         self.low, self.high, self.high_from = low, high, ""
         self.untaken, self.printed = "", None
 
+    def without_unit(self) -> None:
+        """Leaves the unit to the note, and the step with it: it is something else."""
+        self.notes.append(f"the table has {self.unit!r} as its unit")
+        self.unit, self.scale = "", None
+        if self.low or self.high or self.high_from:
+            self.without_range()
+
     def without_range(self) -> None:
         """Leaves the range to the note: it does not fit the step."""
         self.untaken = f"{self.low} to {self.high or self.high_from}"
