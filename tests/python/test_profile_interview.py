@@ -6,10 +6,8 @@ The manuals are made up; what stands in them is typed here twice, as an answer a
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -218,70 +216,6 @@ def test_whatever_is_answered_what_is_written_is_sound(
         assert drivebus.Profile.check(folder) == []
     else:
         assert (done.exit_code, [*folder.glob("*")]) == (2, []), done.output
-
-
-class TestWithTheDriveThere:
-    def test_a_family_that_is_known_needs_no_profile(self, there: Path) -> None:
-        done = asked(there, ["y", "n"], options=("--port", "sim://gd350?clock=virtual"))
-        assert (done.exit_code, there.exists()) == (2, False)
-        assert "no profile is needed: --profile gd350" in " ".join(done.stderr.split())
-
-    @NO_PTY
-    def test_each_row_is_read_and_nothing_is_written(self, there: Path) -> None:
-        assert asked(there, BY_TABLES).exit_code == 0
-        again = there.with_name("again")
-        with Simulator({1: there}, transport="pty") as line:
-            done = asked(again, ["y", *BY_TABLES], options=("--port", line.port))
-            assert done.exit_code == 0, done.output
-            assert "output_current" in done.stdout
-            assert not line.drive(1).writes()
-
-    @NO_PTY
-    def test_by_what_it_answers_it_is_told_from_others(self, there: Path) -> None:
-        """It is commanded from 0000H on, where an ACS355 has its setpoint at 0001H, too, and what it shows at 0005H."""
-        moved = {"0001H": "4001H", "0003H": "4003H", "1000H": "0000H", "1001H": "0001H"}
-        moved |= {"1100H": "0005H", "1101H": "0008H", "1200H": "0006H", "1201H": "0007H"}
-
-        def lower(text: str) -> str:
-            return re.sub("[01][0-9]{3}H", lambda found: moved[found[0]], text)
-
-        there.with_name("registers.csv").write_text(lower(REGISTERS), encoding="utf-8")
-        answers = [lower(answer) for answer in BY_TABLES]
-        assert asked(there, answers).exit_code == 0
-        again = there.with_name("again")
-        with Simulator({1: there}, transport="pty") as line:
-            done = asked(again, ["y", *answers], options=("--port", line.port))
-            assert (done.exit_code, "so that no other is taken for it" in done.stderr) == (0, True), done.output
-            signature = drivebus.Profile.load(again).signature()
-            assert signature is not None
-            assert signature["answers"] == [0x0005, 0x0006]
-            with drivebus.Bus(line.port) as bus:
-                for place in signature["refuses"]:
-                    with pytest.raises(drivebus.Refused, match="02H"):
-                        bus.read(1, place)
-                bus.drive(1, profile=again, unverified=True).write({"speed_setpoint": 5.0})
-            words = ["--port", line.port, "profiles", "check", str(there), "--read"]
-            checked = CliRunner().invoke(cli, words, prog_name="drivebus")
-            assert (checked.exit_code, '\nanswers = ["0x0005", "0x0006"]\n' in checked.stderr) == (0, True)
-        taken = []
-        for profile in (there, again):
-            with Simulator({1: "acs355"}, transport="process", clock="virtual") as line, drivebus.Bus(line) as bus:
-                with suppress(drivebus.NotAllowed):
-                    bus.drive(1, profile=profile, unverified=True).write({"speed_setpoint": 5.0})
-                taken.append([word for _, place, word in line.drive(1).writes() if place == 1])
-        assert taken == [[500], []]
-
-    @NO_PTY
-    def test_what_the_drive_refuses_is_named(self, there: Path) -> None:
-        assert asked(there, BY_TABLES).exit_code == 0
-        again = there.with_name("again")
-        off = ["1202H" if answer == "output_frequency" else answer for answer in BY_TABLES]
-        place = off.index("1202H") + 1
-        off[place:place] = ["41", "0.01 Hz"]
-        with Simulator({1: there}, transport="pty") as line:
-            done = asked(again, ["y", *off], options=("--port", line.port))
-        assert (done.exit_code, "unit 1 refuses output_frequency_2" in done.stderr) == (4, True), done.output
-        assert drivebus.Profile.check(again) == []
 
 
 @NO_PTY

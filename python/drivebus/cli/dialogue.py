@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from typing import TypeVar
+from typing import NamedTuple, TypeVar, cast
 
 import click
 
@@ -18,6 +18,12 @@ T = TypeVar("T")
 _BACK = "back"
 
 
+class _Seen(NamedTuple):
+    """What was found between two answers."""
+
+    what: object
+
+
 class _TakenBack(Exception):  # it is no error
     """The last answer is not meant."""
 
@@ -29,7 +35,7 @@ class Dialogue:
     """
 
     def __init__(self) -> None:
-        self._given: list[str] = []
+        self._given: list[str | _Seen] = []
         self._place = 0
 
     def held(self, ask: Callable[[], T]) -> T:
@@ -39,7 +45,8 @@ class Dialogue:
             try:
                 return ask()
             except _TakenBack:
-                self._given.pop()
+                while isinstance(self._given.pop(), _Seen):
+                    pass
 
     def needed(self, question: str, read: Callable[[str], T], default: str | None = None) -> T:
         """What *read* makes of an answer, asked for until it can; Enter is *default*, if there is one.
@@ -48,7 +55,14 @@ class Dialogue:
             click.Abort: The input ended, or Ctrl-C was pressed.
         """
         if self._place < len(self._given):
-            return self._taken(self._given[self._place], read)
+            before = self._place
+            try:
+                return self._taken(str(self._given[before]), read)
+            except click.UsageError as error:
+                # A part of reading it was taken back, and what was answered then speaks against it.
+                del self._given[before:]
+                self._place = before
+                remark(f"Error: {error.message}")
 
         def heard(said: str) -> T:
             if default is None and not said.strip():
@@ -75,9 +89,10 @@ class Dialogue:
         """As `needed`; None where Enter leaves it out."""
         return self.needed(question, lambda said: read(said.strip()) if said.strip() else None, "")
 
-    def agreed(self, question: str, *, default: bool) -> bool:
-        """Yes or no."""
-        return self.needed(f"{question} [{'Y/n' if default else 'y/N'}]", lambda said: _agreed(said, default), "")
+    def agreed(self, question: str, *, default: bool | None) -> bool:
+        """Yes or no; with None for *default*, Enter is neither."""
+        choices = {True: "Y/n", False: "y/N", None: "y/n"}[default]
+        return self.needed(f"{question} [{choices}]", lambda said: _agreed(said, default), "")
 
     def insisted(self, question: str, else_said: str) -> None:
         """Asks whether what speaks against the tables is meant.
@@ -101,7 +116,15 @@ class Dialogue:
             while (line := sys.stdin.readline()).strip() != "." and line:
                 lines.append(line)
             self._given.append("".join(lines))
-        return self._taken(self._given[self._place], str)
+        return self._taken(str(self._given[self._place]), str)
+
+    def seen(self, look: Callable[[], T]) -> T:
+        """What *look* finds now; as it was found, where this is gone through again."""
+        if self._place == len(self._given):
+            self._given.append(_Seen(look()))
+        found = self._given[self._place]
+        self._place += 1
+        return cast("T", found.what if isinstance(found, _Seen) else found)
 
     def say(self, text: str) -> None:
         """Says *text*, once."""
@@ -113,8 +136,8 @@ class Dialogue:
         return read(said)
 
 
-def _agreed(said: str, default: bool) -> bool:
-    if not said.strip():
+def _agreed(said: str, default: bool | None) -> bool:
+    if not said.strip() and default is not None:
         return default
     answer = {"y": True, "yes": True, "n": False, "no": False}.get(said.strip().lower())
     if answer is None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from fractions import Fraction
 
 from drivebus.cli import answer_values as values
 from drivebus.cli.dialogue import Dialogue
+from drivebus.cli.drive_beside import DriveBeside
 from drivebus.cli.interview_registers import insist
 from drivebus.cli.interview_tables import Pages
 from drivebus.cli.manual_cells import TableRow
@@ -30,10 +32,11 @@ _ADDRESS = r"0x[0-9a-f]{1,4}|[0-9a-f]{1,4}h|[34]\d{4,5}"
 class ParameterQuestions:
     """What is asked about the parameters of *table*, and of those that it has not."""
 
-    def __init__(self, dialogue: Dialogue, pages: Pages, table: ManualTable) -> None:
+    def __init__(self, dialogue: Dialogue, pages: Pages, table: ManualTable, beside: DriveBeside) -> None:
         self._dialogue = dialogue
         self._pages = pages
         self._table = table
+        self._beside = beside
 
     def control(self) -> Iterator[Setting]:
         """What must be set so that the drive obeys the bus."""
@@ -61,6 +64,7 @@ class ParameterQuestions:
             question = f"The table has {known}. Is {word} printed all the same?"
             self._dialogue.insisted(question, f"{row.code} cannot be {word}")
             row.choices[word] = "not in the table"
+        self._beside.check(row)
         if _NO_BUS.search(row.choices.get(word, "")):
             self._insist(row, word, "obeys the bus")
         return row, word
@@ -123,12 +127,17 @@ class ParameterQuestions:
         if row.unit != unit or row.scale is None:
             such = "0.1 s" if unit == "s" else f"0.01 {unit}"
             question = f"One count of {called} is, such as {such}"
-            step = self._dialogue.optional(question, lambda text: values.step(text, unit))
+            step = self._dialogue.optional(question, lambda text: self._step(row, text, unit))
             if step is None:
                 return False
             row.unit, row.scale = unit, int(1 / step)
             row.take_printed()
         return True
+
+    def _step(self, row: TableRow, text: str, unit: str) -> Fraction:
+        step = values.step(text, unit)
+        self._beside.check_now(row, unit, int(1 / step))
+        return step
 
     def take_access(self) -> None:
         """Which parameters may be written while the motor turns, where their table does not tell."""
@@ -156,6 +165,7 @@ class ParameterQuestions:
         def read(text: str) -> TableRow:
             row = self.parameter(text)
             insist(self._dialogue, row, question, kind, units)
+            self._beside.check(row)
             return row
 
         return self._dialogue.optional(question, read)
@@ -176,6 +186,7 @@ class ParameterQuestions:
         found = self._dialogue.optional(question, values.place)
         if found is None or found[0] != "holding":
             raise WrongUse(f"{code} needs the address of a holding register")
+        self._beside.check_place(found[1])
         row = self._table.at(found[1]) or self._table.add(found[1], code, self._pages.source())
         row.code = row.code or code
         return row

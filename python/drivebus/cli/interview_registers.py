@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from drivebus.cli import answer_values as values
 from drivebus.cli.dialogue import Dialogue
+from drivebus.cli.drive_beside import DriveBeside
 from drivebus.cli.interview_tables import Pages
 from drivebus.cli.manual_cells import TableRow
 from drivebus.cli.manual_table import ManualTable
@@ -42,10 +43,11 @@ FAULT = Role("Register that tells the number of a fault", "fault", "Fault", "ro"
 
 
 class RegisterQuestions:
-    """Asks for rows of *table*, and adds to it what it has not."""
+    """Asks for rows of *table*, and adds to it what it has not. The drive that is *beside* should have them."""
 
-    def __init__(self, dialogue: Dialogue, pages: Pages, table: ManualTable) -> None:
+    def __init__(self, dialogue: Dialogue, pages: Pages, table: ManualTable, beside: DriveBeside) -> None:
         self.table = table
+        self.beside = beside
         self._dialogue = dialogue
         self._pages = pages
         self._used: list[TableRow] = []
@@ -70,7 +72,20 @@ class RegisterQuestions:
             raise WrongUse(f"{text} is the register of another answer")
         if isinstance(found, TableRow):
             insist(self._dialogue, found, role.question, role.kind, role.units)
+        if role is not COMMAND:
+            self._compare(role, found)
         return found
+
+    def _compare(self, role: Role, found: TableRow | int) -> None:
+        """Holds what the drive shows there now against what it should be."""
+        if isinstance(found, TableRow):
+            place, word = found.place, self.beside.check(found)
+        else:
+            place, word = found, self.beside.check_place(found)
+        if role is FREQUENCY:
+            self.beside.check_speed(place, word)
+        elif role is FAULT:
+            self.beside.check_fault(place, word)
 
     def _known_or_place(self, text: str) -> TableRow | int:
         row = self.table.called(text)

@@ -9,6 +9,7 @@ from drivebus.cli import answer_values as values
 from drivebus.cli.dialogue import Dialogue
 from drivebus.cli.interview_registers import STATE, RegisterQuestions
 from drivebus.cli.interview_tables import Pages, one_of
+from drivebus.cli.manual_cells import TableRow
 from drivebus.cli.printed_words import prints_bits, prints_words
 from drivebus.cli.profile_answers import Bits, State
 from drivebus.cli.wrong_use import WrongUse
@@ -26,6 +27,7 @@ _STATES = {
 }
 _BY_BITS = ("fault", "forward", "reverse", "running", "stopped")
 """Of those that fit, the first counts, where none is a running motor."""
+_AGAIN = "Then it is told otherwise, or by another register: back leads to that"
 
 
 class StateQuestions:
@@ -42,16 +44,48 @@ class StateQuestions:
         if register is None:
             return None
         register.scale = 1
-        how = self._dialogue.needed(
-            "It tells by one number for each state, or by bits (number, bits)", one_of(("number", "bits"))
-        )
-        if how == "number":
-            numbers = self._each_state(_STATES, "Number", values.word)
-            told = prints_words(register, numbers.values())
-            return State(register, numbers, {}, self._pages.source_of(register, is_printed=told)) if numbers else None
-        bits = self._each_state(_BY_BITS, "Bits, such as 0=1, 4-3=2,", values.bits, _is_shown)
-        told = prints_bits(register, [field for each in bits.values() for field in each])
-        return State(register, {}, bits, self._pages.source_of(register, is_printed=told)) if bits else None
+        question = "It tells by one number for each state, or by bits (number, bits)"
+        state = self._dialogue.needed(question, lambda text: self._described(register, text))
+        if state is None:
+            return None
+        if state.numbers:
+            told = prints_words(register, state.numbers.values())
+        else:
+            told = prints_bits(register, [field for each in state.bits.values() for field in each])
+        state.source = self._pages.source_of(register, is_printed=told)
+        return state
+
+    def _described(self, register: TableRow, text: str) -> State | None:
+        """What *register* shows in each state, by numbers or by bits as *text* says, if the drive shows one of them."""
+        if one_of(("number", "bits"))(text) == "number":
+            state = State(register, self._each_state(_STATES, "Number", values.word), {}, "")
+        else:
+            bits = self._each_state(_BY_BITS, "Bits, such as 0=1, 4-3=2,", values.bits, _is_shown)
+            state = State(register, {}, bits, "")
+        if not (state.numbers or state.bits):
+            return None
+        self._compare(state)
+        return state
+
+    def _compare(self, state: State) -> None:
+        """Asks whether the motor does what the drive shows now.
+
+        Raises:
+            WrongUse: It does not.
+        """
+        beside = self._registers.beside
+        word = beside.word(state.register.place)
+        if word is None:
+            return
+        now = f"{state.register.name} shows {word:04X}H now"
+        shown = state.shown_by(word)
+        if shown is None:
+            self._dialogue.insisted(f"{now}, which is none of these. Are they right all the same?", f"{now}. {_AGAIN}")
+            return
+        does = _STATES[shown].removeprefix("while ")
+        if not self._dialogue.agreed(f"{now}: {does}. Is that so?", default=None):
+            raise WrongUse(f"{now}: not that {does}. {_AGAIN}")
+        beside.state = shown
 
     def _each_state(
         self,

@@ -118,9 +118,14 @@ class TableRow:
     printed: Printed | None = None
 
     @property
+    def place(self) -> int:
+        """Where it is, with its table."""
+        return tables.place(self.table, self.address)
+
+    @property
     def shown(self) -> str:
         """Where it is, in words."""
-        return tables.shown(tables.place(self.table, self.address))
+        return tables.shown(self.place)
 
     @property
     def bits(self) -> dict[tuple[int, int], str]:

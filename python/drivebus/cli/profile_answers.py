@@ -49,6 +49,12 @@ class State:
     bits: dict[str, Bits]
     source: str
 
+    def shown_by(self, word: int) -> str | None:
+        """The state that *word* shows; None where it is none of them."""
+        by_number = (name for name, number in self.numbers.items() if number == word)
+        by_bits = (name for name, bits in self.bits.items() if all(_field(word, at) == bits[at] for at in bits))
+        return next(by_number, None) or next(by_bits, None)
+
     def fields(self) -> list[tuple[int, int]]:
         """Highest and lowest bit of each field: of those that tell a state, and of others that its table names."""
         fields = list(dict.fromkeys(place for bits in self.bits.values() for place in bits))
@@ -249,6 +255,12 @@ class Answers:
         measured = [row for row in self.table.registers if row.access == "ro" and row.scale is not None and row.unit]
         names = [row.name for row in (*roles, *measured) if row is not None]
         return list(dict.fromkeys(names))[:_MOST_SHOWN]
+
+
+def _field(word: int, at: tuple[int, int]) -> int:
+    """What stands in *word* between two bits, the highest one first."""
+    high, low = at
+    return word >> low & (1 << high - low + 1) - 1
 
 
 def _table(name: str, **keys: object) -> Iterator[str]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import click
 
 import drivebus
 from drivebus.cli import own_signature, profile_interview, profile_template
+from drivebus.cli.drive_beside import WordReader
 from drivebus.cli.halts_elsewhere import started_by
 from drivebus.cli.manual_cells import COUNTS
 from drivebus.cli.manual_table import ManualTable
@@ -171,8 +173,8 @@ def new(
     With --table its rows are those of a manual's table: with a code, parameters, else registers. Each row that could
     not be read is named, with the reason.
 
-    Where it asks, the drive may be there: then it is asked which family it may be, and each row is read once.
-    Nothing is written to it.
+    Where it asks, the drive may be there: then it is asked which family it may be, each answer is held against what
+    it shows, and each row is read once. Nothing is written to it.
     """
     if (like is not None) + (overlay is not None) + (table is not None) > 1:
         raise WrongUse("give one of --like, --overlay and --table: a profile is a copy, an overlay, or new")
@@ -192,7 +194,7 @@ def new(
         _check_free(folder)
         read = None
         if asks:
-            _ask(context, session, folder, lambda: profile_interview.ask(table, source, addresses))
+            _ask(context, session, folder, lambda reader: profile_interview.ask(table, source, addresses, reader))
             return
         if table is None or not source:
             written = profile_template.files(name, like=like, overlay=overlay)
@@ -224,15 +226,19 @@ def _write(folder: Path, written: dict[str, str]) -> None:
             file.write(text)
 
 
-def _ask(context: click.Context, session: Session, folder: Path, ask: Callable[[], Answers]) -> None:
+def _ask(context: click.Context, session: Session, folder: Path, ask: Callable[[WordReader | None], Answers]) -> None:
     """Makes a profile of what is answered, checks it, and compares it with the drive if that is there."""
     try:
         is_there = session.port is not None and click.confirm(
             f"Is the drive at {session.port}, {session.called}, now? It is only read", default=True, err=True
         )
-        if is_there and not _goes_on(session):
-            raise Declined("Cancelled. Nothing was written.")
-        answers = ask()
+        with ExitStack() as stack:
+            bus = stack.enter_context(session.bus()) if is_there else None
+            reader = None if bus is None else WordReader(bus, session.unit, session.called)
+            if bus is not None and reader is not None and not _goes_on(session, bus, reader):
+                raise Declined("Cancelled. Nothing was written.")
+            answers = ask(reader)
+        is_there = reader is not None and not reader.is_silent
     except click.Abort:
         remark()
         raise Declined("Cancelled. Nothing was written.") from None
@@ -247,10 +253,13 @@ def _ask(context: click.Context, session: Session, folder: Path, ask: Callable[[
     session.out.say(f"Try it on a simulated drive: drivebus sim --units {unit}={folder}")
 
 
-def _goes_on(session: Session) -> bool:
+def _goes_on(session: Session, bus: drivebus.Bus, reader: WordReader) -> bool:
     """Whether a new profile is wanted, although the drive may be of a family that is known."""
-    with session.bus() as bus:
+    try:
         found = bus.identify(session.unit)
+    except (drivebus.NoAnswer, drivebus.BadAnswer) as error:
+        reader.fall_silent(error)
+        return True
     if not found.candidates:
         remark(f"{session.called} is of no family that is known: {found.reason}.")
         return True
