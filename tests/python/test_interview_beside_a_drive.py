@@ -280,6 +280,62 @@ def test_what_no_table_has_is_looked_for_in_the_drive(there: Path, place: str, w
     assert rules(there.with_name("again")) == rules(there)
 
 
+COUNTED_FROM_1 = """\
+Address,Name,Unit,R/W
+1000H,Command,,W
+1002H,Speed setpoint,0.01Hz,R/W
+1101H,State,,R
+1102H,Fault number,,R
+1202H,Output current,0.1A,R
+1203H,Serial number,,
+"""
+
+
+@NO_PTY
+def test_a_table_is_held_against_the_drive_before_any_question_of_it(there: Path) -> None:
+    """Its addresses are one too high: it is asked for anew. What it calls readable counts, and nothing else."""
+    assert asked(there, BY_TABLES).exit_code == 0
+    (there.parent / "off.csv").write_text(COUNTED_FROM_1, encoding="utf-8")
+    place = BESIDE.index("registers.csv")
+    slip = [*BESIDE[:place], "off.csv", "41", "", *BESIDE[place:]]
+    with Simulator({1: there}, transport="pty") as line:
+        done = again(line, there, slip)
+    assert done.exit_code == 0, done.output
+    told = "unit 1 refuses speed_setpoint at 1002H, fault_number at 1102H, output_current at 1202H"
+    assert f"{told}. Is the table right all the same?" in said(done)
+    assert "unit 1 refuses serial_number at 1203H." in said(done)
+    assert "unit 1 shows speed_setpoint 50.00 Hz, output_frequency 0.00 Hz, output_current 0.0 A." in said(done)
+    assert rules(there.with_name("again")) == rules(there)
+    assert "speed_setpoint" in drivebus.Profile.load(there.with_name("again")).names()
+
+
+@NO_PTY
+def test_a_value_that_its_table_has_not_speaks_against_the_table(there: Path) -> None:
+    assert asked(there, BY_TABLES).exit_code == 0
+    place = BESIDE.index("42")
+    low = [line.replace("10.00-400.00   ", "10.00-40.00 Hz ") for line in BESIDE]
+    low[place + 1 : place + 2] = ["y", ""]
+    with Simulator({1: there}, transport="pty") as line:
+        done = again(line, there, [*low[: place + 3], *BESIDE[BESIDE.index("-") :]])
+    assert done.exit_code == 0, done.output
+    assert "P00.03 is 50.00 Hz now, and its table has 10.00 to 40.00. Is the table right all the same?" in said(done)
+    assert rules(there.with_name("again")) == rules(there)
+
+
+@NO_PTY
+def test_a_setpoint_that_is_refused_is_only_written(there: Path) -> None:
+    """As many drives have it: then it is no part of what is read."""
+    assert asked(there, BY_TABLES).exit_code == 0
+    unknown = REGISTERS.replace("1001H,Speed setpoint,0.01Hz,R/W", "1005H,Speed setpoint,0.01Hz,")
+    there.with_name("registers.csv").write_text(unknown, encoding="utf-8")
+    place = BESIDE.index("speed_setpoint") + 1
+    with Simulator({1: there}, transport="pty") as line:
+        done = again(line, there, [*BESIDE[:place], "y", *BESIDE[place:]])
+    assert (done.exit_code, "unit 1 refuses 1005H" in said(done)) == (0, True), done.output
+    profile = drivebus.Profile.load(there.with_name("again"))
+    assert (profile.describe("speed_setpoint").access, profile.role("setpoint")) == ("wo", None)
+
+
 def test_what_is_answered_after_going_back_may_speak_against_what_it_is_a_part_of(there: Path) -> None:
     """The address of a parameter is taken back, and left out: then its code is asked for once more."""
     place = BY_HAND.index("0100H")

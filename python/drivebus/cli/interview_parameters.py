@@ -136,7 +136,7 @@ class ParameterQuestions:
 
     def _step(self, row: TableRow, text: str, unit: str) -> Fraction:
         step = values.step(text, unit)
-        self._beside.check_now(row, unit, int(1 / step))
+        self._beside.check_step(row, unit, int(1 / step))
         return step
 
     def take_access(self) -> None:

@@ -62,6 +62,8 @@ class RegisterQuestions:
         self._used.append(row)
         if row.access == "unknown":
             row.access = role.access
+        if row.access == "rw" and row.place in self.beside.refused:
+            row.access = "wo"
         if row.unit and row.unit not in role.units:
             row.without_unit()
         return row

@@ -84,5 +84,5 @@ class SpeedQuestions:
         told = next((note for note in row.notes if "%" in note), None)
         if told is not None:
             self._dialogue.meant(told, text)
-        self._registers.beside.check_now(row, "Hz", int(1 / said))
+        self._registers.beside.check_step(row, "Hz", int(1 / said))
         return said

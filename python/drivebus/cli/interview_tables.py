@@ -8,6 +8,7 @@ from pathlib import Path
 import drivebus
 from drivebus.cli import answer_values as values
 from drivebus.cli.dialogue import Dialogue
+from drivebus.cli.drive_beside import DriveBeside
 from drivebus.cli.manual_cells import COUNTS, TableRow, UnclearAddresses
 from drivebus.cli.manual_table import ManualTable, NoAddresses
 from drivebus.cli.wrong_use import WrongUse
@@ -54,10 +55,11 @@ class TableQuestions:
         table: The rows of all of them.
     """
 
-    def __init__(self, dialogue: Dialogue, pages: Pages) -> None:
-        self.table = ManualTable()
+    def __init__(self, dialogue: Dialogue, pages: Pages, table: ManualTable, beside: DriveBeside) -> None:
+        self.table = table
         self._dialogue = dialogue
         self._pages = pages
+        self._beside = beside
 
     def take_tables(self, count: str | None) -> None:
         """Tables of the manual, until there are no more."""
@@ -90,6 +92,10 @@ class TableQuestions:
         for kind, found in (("Registers", registers), ("Parameters", parameters)):
             if found:
                 self._dialogue.say(f"{kind}: {', '.join(f'{row.code or row.name} at {row.shown}' for row in found)}.")
+        against = self._beside.against_table([*registers, *parameters])
+        if against and not self._dialogue.agreed(f"{against}. Is the table right all the same?", default=False):
+            self.table.take_back()
+            self._dialogue.say("Then it is left out: give it once more, its addresses or steps as the drive has them.")
 
     def _read(self, data: bytes, source: str, count: str | None) -> list[TableRow]:
         """The rows of a table, whose addresses may have to be asked for."""

@@ -83,6 +83,7 @@ class ManualTable:
         self.left_out: list[tuple[int, str]] = []
         self.unused: list[str] = []
         self._names: dict[str, int] = {}
+        self._before: tuple[int, dict[str, int]] = (0, {})
 
     def read(self, data: bytes, source: str, *, count: str | None = None) -> list[TableRow]:
         """Adds the rows of a table; says which these are.
@@ -106,6 +107,7 @@ class ManualTable:
         said = "code" if by_code else "address"
         taken = {(row.table, row.address): row.name for row in self.rows}
         self.left_out, before = [], len(self.rows)
+        self._before = before, dict(self._names)
         for line, row in cells:
             place = place_of_code(row["code"]) if by_code else place_of(row["address"], count)
             if place is None:
@@ -118,6 +120,11 @@ class ManualTable:
                 taken[place] = f"line {line}"
                 self.rows.append(self._row(line, place, row, source))
         return self.rows[before:]
+
+    def take_back(self) -> None:
+        """Takes the rows of the last table away again, and their names."""
+        count, self._names = self._before
+        del self.rows[count:]
 
     def called(self, text: str) -> TableRow | None:
         """The row of which *text* is the code, the name or the label; None where several have that label, or none."""

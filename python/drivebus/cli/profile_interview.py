@@ -17,6 +17,7 @@ from drivebus.cli.interview_registers import FAULT, FREQUENCY, RegisterQuestions
 from drivebus.cli.interview_speed import SpeedQuestions
 from drivebus.cli.interview_state import StateQuestions
 from drivebus.cli.interview_tables import Pages, TableQuestions, content
+from drivebus.cli.manual_table import ManualTable
 from drivebus.cli.profile_answers import Answers
 from drivebus.cli.wrong_use import WrongUse
 
@@ -60,9 +61,9 @@ class _Interview:
     def __init__(self, dialogue: Dialogue, manual: str, reader: WordReader | None) -> None:
         self._dialogue = dialogue
         self._pages = Pages(dialogue, manual)
-        self.tables = TableQuestions(dialogue, self._pages)
-        self.table = self.tables.table
+        self.table = ManualTable()
         beside = DriveBeside(dialogue, self.table, reader)
+        self.tables = TableQuestions(dialogue, self._pages, self.table, beside)
         self._parameters = ParameterQuestions(dialogue, self._pages, self.table, beside)
         self._registers = RegisterQuestions(dialogue, self._pages, self.table, beside)
         self._speed = SpeedQuestions(dialogue, self._pages, self._registers, self._parameters)
