@@ -57,6 +57,7 @@ READ_ONLY = {
     "e510": 0x05,
     "f510": 0x04,
     "cfw500": 0x03,
+    "starvert": 0x14,
     # Its manual (1755863, p. 39) refuses a write of ETA so.
     "atv71": 0x04,
 }
@@ -85,6 +86,7 @@ OUT_OF_RANGE = {
             "vacon10",
             "smd",
             "nowforever",
+            "starvert",
         ],
         0x03,
     ),
@@ -102,6 +104,7 @@ WITHOUT = {
     "vfd500": {"jog_stop"},
     "md500": {"jog_stop"},
     "frenic": {"coast", "jog_forward", "jog_reverse", "jog_stop"},
+    "starvert": {"coast", "jog_forward", "jog_reverse", "jog_stop"},
     "smd": {"coast", "reset_fault", "jog_forward", "jog_reverse", "jog_stop"},
     "cfw500": {"jog_forward", "jog_reverse", "jog_stop"},
     "dc1": {"jog_forward", "jog_reverse", "jog_stop"},

@@ -132,6 +132,7 @@ def test_where_no_page_says_that_a_ramp_is_told_the_frequency_is_looked_at(famil
         "dc1",
         "sj200",
         "smd",
+        "starvert",
         "vacon10",
         "vf-s15",
         "yl620",

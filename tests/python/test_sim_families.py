@@ -66,6 +66,7 @@ FAMILIES = {
     50: "smd",
     51: "nowforever",
     52: "f510",
+    53: "starvert",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]
@@ -287,12 +288,13 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "vacon10",
             "smd",
             "nowforever",
+            "starvert",
         ):
             assert refusal(bus, family, pdu(0x08, 0, 0x12AB)) == unknown
         else:
             assert bus.transact(UNIT[family], pdu(0x08, 0, 0x12AB)) == pdu(0x08, 0, 0x12AB)
-        # An H100, a Vacon 10 and an SMD have 04H, and nothing there.
-        nothing = 0x02 if family in ("h100", "vacon10", "smd") else unknown
+        # An H100, a Vacon 10, an SMD and a LS drive have 04H, and nothing there.
+        nothing = 0x02 if family in ("h100", "vacon10", "smd", "starvert") else unknown
         assert refusal(bus, family, pdu(0x04, 0x2100, 1)) == nothing, family
     write_many = bytes.fromhex("10 2000 0001 02 0005")
     for family in ("gd3000", "gd3000-rectifier", "chf100a", "chv100"):

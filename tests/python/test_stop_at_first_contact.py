@@ -47,6 +47,8 @@ QUESTIONS = {
     "nowforever": (17, 290),
     # And for its own 0013H and 001AH; register 1 is a parameter of Goodrives and others.
     "smd": (10, 172),
+    # At 0005H many another drive has a parameter. What has 04H answers by it elsewhere.
+    "starvert": (5, 90),
     "frenic": (9, 158),
     "v20": (9, 158),
     # A WJ200 has its direction where this one stops.

@@ -15,7 +15,7 @@ import tomli
 import drivebus
 
 FOLDER = Path(__file__).resolve().parent.parent / "vectors"
-FAMILIES = ["gd350", "gd20", "gd600", "gd3000", "vfd500"]
+FAMILIES = ["gd350", "gd20", "gd600", "gd3000", "vfd500", "starvert"]
 
 Fields = dict[str, Any]
 
@@ -89,7 +89,7 @@ def encode(fields: Fields) -> bytes:
 
 def test_every_worked_example_is_here() -> None:
     counts = [len(file["exchange"]) + len(file.get("template", [])) for file in map(load, FAMILIES)]
-    assert counts == [15, 2, 8, 7, 13]
+    assert counts == [15, 2, 8, 7, 13, 2]
     assert len(MISPRINTS) == 5
 
 

@@ -73,6 +73,7 @@ SILENT_ON_CODES = [
     "cfw500",
     "smd",
     "nowforever",
+    "starvert",
 ]
 """The families whose units refuse 2103H."""
 
@@ -87,6 +88,7 @@ SIGNED = [
     "smd",
     "nowforever",
     "f510",
+    "starvert",
 ]
 """Those of them that are told by what they answer and refuse, once something of them is strange."""
 
@@ -141,6 +143,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "dc1": ["dc1"],
     # And this one 0013H, 001AH and 0032H, and neither 080EH, 0502H nor an input register.
     "smd": ["smd"],
+    # And this one input registers 0000H and 000EH.
+    "starvert": ["starvert"],
     # And this one 2520H and 2524H, and that one 1700H, too.
     "e510": ["e510"],
     "f510": ["f510"],

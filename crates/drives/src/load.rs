@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 52] = [
+static BUILTINS: [Builtin; 53] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -195,6 +195,7 @@ static BUILTINS: [Builtin; 52] = [
     builtin!("optidrive-e3": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("dc1": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("smd": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("starvert": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("huanyang-hy": "registers.csv" "parameters.csv" "faults.csv"),
 ];
 

@@ -224,6 +224,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("e510", 68),
         ("f510", 129),
         ("smd", 12),
+        ("starvert", 20),
         ("eds300", 17),
         ("fc51", 23),
         ("fr-d700", 39),

@@ -111,7 +111,7 @@ fn of_the_shipped_profiles_only_six_words_say_two_things() {
                         "cfw500",
                         "vacon10",
                         "dc1",
-                        "nowforever"
+                        "nowforever" | "starvert"
                     ]
                     .contains(&name),
                 "{name}: {raw:04X}H is {said:?}"

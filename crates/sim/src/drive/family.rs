@@ -48,6 +48,7 @@ mod roles;
 mod saj8000m;
 mod sj200;
 mod smd;
+mod starvert;
 mod sunfar;
 mod unlisted;
 mod v20;
@@ -170,7 +171,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 52] = [
+const FAMILIES: [fn() -> Family; 53] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -222,6 +223,7 @@ const FAMILIES: [fn() -> Family; 52] = [
     optidrive::e3,
     powerxl::dc1,
     smd::smd,
+    starvert::starvert,
     huanyang::huanyang,
 ];
 

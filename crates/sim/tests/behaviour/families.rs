@@ -212,6 +212,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "optidrive-e3",
         "dc1",
         "smd",
+        "starvert",
     ] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }

@@ -20,6 +20,7 @@ mod hitachi;
 mod inovance;
 mod invertek;
 mod lenze;
+mod ls;
 mod memory;
 mod mitsubishi;
 mod own_profiles;
