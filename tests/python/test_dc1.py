@@ -127,7 +127,9 @@ def test_one_runs_by_its_own_name_only(unit: str, named: str, reverse: bool) -> 
         assert abs(line.drive(1).frequency) == (20.0 if turns else 0.0)
 
 
-@pytest.mark.parametrize("family", ["dc1", "optidrive-e3", "acs355", "acs580", "vacon10", "v20", "sj200", "wj200"])
+@pytest.mark.parametrize(
+    "family", ["dc1", "optidrive-e3", "acs355", "acs580", "vacon10", "v20", "sj200", "wj200", "x200"]
+)
 def test_each_is_known_by_its_answers(family: str) -> None:
     with Simulator({1: family}, transport="process", clock="virtual") as line, Bus(line) as bus:
         found = bus.identify(1)

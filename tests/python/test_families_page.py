@@ -134,7 +134,7 @@ def test_the_list_says_how_much_of_each_is_printed() -> None:
 
 
 DOCUMENTS = re.compile(
-    r"(?:manualshive|manualslib|manualarchiveguide|INVT ebook|issue) (\d+)"
+    r"(?:manualshive|manualslib|manualsdir|manualsdump|azmanual|manualarchiveguide|INVT ebook|issue) (\d+)"
     r"|easymanua\.ls (?:(?:abb|danfoss|siemens) )?([a-z0-9-]+)"
     r"|((?:AAV|BBV|EAV|NVE)\d+)"
 )

@@ -113,7 +113,7 @@ UNITS = {
         0x0000,
         [
             *("optidrive-e3", "acs355", "acs580", "v20", "a1000", "fr-d700", "h100", "gd350", "gd600", "md500"),
-            *("yl620", "chf100a", "vacon10", "sj200", "wj200", "e510"),
+            *("yl620", "chf100a", "vacon10", "sj200", "wj200", "x200", "e510"),
         ],
         frozenset({0, 8}),
     ),
@@ -136,6 +136,19 @@ UNITS = {
             "cfw500",
         ],
     ),
+    # A WJ200 stops by the same coil and has its direction the other way, an SJ200 runs by its direction. A place of a
+    # coil is 10000H above its address.
+    "x200": Unit(
+        [],
+        0x10000,
+        [
+            *("sj200", "wj200", "h100", "acs355", "a1000", "gd350", "gd600", "optidrive-e3", "dc1", "smd"),
+            *("chf100a", "saj8000m", "ms300", "v20", "fr-d700", "vf-s15", "md500", "fc51"),
+        ],
+    ),
+    "wj200": Unit([], 0x10000, ["x200", "sj200"]),
+    "sj200": Unit([], 0x10001, ["x200", "wj200"]),
+    "h100": Unit([(0x0001, 2), (0x0002, 2)], 0x1004B, ["x200"], frozenset({1})),
 }
 PAIRS = [(unit, other) for unit, known in UNITS.items() for other in known.others]
 

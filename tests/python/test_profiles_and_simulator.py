@@ -53,7 +53,7 @@ READ_ONLY = {
         ],
         0x02,
     ),
-    **dict.fromkeys(["a1000", "j1000", "sj200"], 0x22),
+    **dict.fromkeys(["a1000", "j1000", "sj200", "x200"], 0x22),
     "e510": 0x05,
     "f510": 0x04,
     "cfw500": 0x03,
@@ -90,7 +90,7 @@ OUT_OF_RANGE = {
         ],
         0x03,
     ),
-    **dict.fromkeys(["a1000", "j1000", "sj200"], 0x21),
+    **dict.fromkeys(["a1000", "j1000", "sj200", "x200"], 0x21),
 }
 """And a value that is out of range, where it is not their 04H."""
 

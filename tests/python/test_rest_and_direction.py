@@ -131,6 +131,7 @@ def test_where_no_page_says_that_a_ramp_is_told_the_frequency_is_looked_at(famil
         "optidrive-e3",
         "dc1",
         "sj200",
+        "x200",
         "smd",
         "starvert",
         "vacon10",

@@ -67,6 +67,7 @@ FAMILIES = {
     51: "nowforever",
     52: "f510",
     53: "starvert",
+    54: "x200",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]

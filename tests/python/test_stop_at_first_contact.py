@@ -12,7 +12,7 @@ import drivebus
 from drivebus import Bus, Profile, Simulator
 
 QUESTIONS = {
-    **dict.fromkeys(("vfd500", "wj200", "h100"), (0, 4)),
+    **dict.fromkeys(("vfd500", "wj200", "x200", "h100"), (0, 4)),
     **dict.fromkeys(("gd350", "gd35", "gd35-h1", "gd300", "gd10", "gd20", "gd100", "gd200a"), (4, 75)),
     # These do not say what they are, and others have a parameter where they have their state.
     **dict.fromkeys(("gd600", "gd3000"), (6, 107)),
@@ -37,7 +37,8 @@ QUESTIONS = {
     "a1000": (8, 140),
     "j1000": (9, 158),
     # And these, and for 7000H and 2520H: an MD500 has its setpoint, an F510 a parameter where they take their commands.
-    **dict.fromkeys(("chf100a", "saj8000m"), (11, 188)),
+    # And for 1028H, which an X200 has.
+    **dict.fromkeys(("chf100a", "saj8000m"), (12, 205)),
     # An Altivar 600 is asked for CHCF, too: in its I/O profile 07H runs it. By the other two names nobody would ask it,
     # so one more word tells that they are none.
     **dict.fromkeys(("atv312", "atv12", "atv320", "atv600", "atv71"), (7, 120)),
@@ -51,7 +52,7 @@ QUESTIONS = {
     "starvert": (5, 90),
     "frenic": (9, 158),
     "v20": (9, 158),
-    # A WJ200 has its direction where this one stops.
+    # A WJ200 and an X200 have their direction where this one stops.
     "sj200": (7, 125),
     # It is commanded where Goodrives and others have parameters, some of them without a code.
     "optidrive-e3": (9, 158),

@@ -68,6 +68,7 @@ SILENT_ON_CODES = [
     "optidrive-e3",
     "dc1",
     "sj200",
+    "x200",
     "e510",
     "f510",
     "cfw500",
@@ -83,6 +84,7 @@ SIGNED = [
     "optidrive-e3",
     "dc1",
     "sj200",
+    "x200",
     "cfw500",
     "vacon10",
     "smd",
@@ -110,9 +112,10 @@ TAKEN_FOR: dict[str, list[str]] = {
     "gd200a": ["gd200a"],
     # This one answers r25.00 and P30.14, which no other does.
     "vfd500": ["vfd500"],
-    # These have coils, which no other has; this one 1003H, and that one 000CH and nothing at 1003H.
+    # These have coils, which no other has; this one 1200H, that one 000CH and nothing at 1003H, and this one 1028H.
     "wj200": ["wj200"],
     "sj200": ["sj200"],
+    "x200": ["x200"],
     # And this one answers 04H, which no other does.
     "h100": ["h100"],
     # And this one 2104H and 2106H, this one 2108H and 2109H, and this one 200BH and 2012H.

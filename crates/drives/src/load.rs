@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 53] = [
+static BUILTINS: [Builtin; 54] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -191,6 +191,7 @@ static BUILTINS: [Builtin; 53] = [
     builtin!("vacon10": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("wj200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("sj200": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("x200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("h100": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("optidrive-e3": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("dc1": "registers.csv" "parameters.csv" "faults.csv"),

@@ -172,6 +172,7 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("PowerXL DE1", "dc1"),
         ("Hitachi SJ200", "sj200"),
         ("Hitachi L200", "sj200"),
+        ("Hitachi X200", "x200"),
         ("FC 202", "fc202"),
         ("VLT FC 102", "fc202"),
         ("FC-302", "fc202"),

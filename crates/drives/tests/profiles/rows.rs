@@ -249,6 +249,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("dc1", 22),
         ("saj8000m", 14),
         ("sj200", 23),
+        ("x200", 22),
         ("sunfar-e300", 6),
         ("v20", 19),
         ("vf-s15", 9),

@@ -58,6 +58,7 @@ mod vfd500;
 mod vfd_b;
 mod vfd_e;
 mod wj200;
+mod x200;
 mod yl620;
 
 use std::borrow::Cow;
@@ -171,7 +172,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 53] = [
+const FAMILIES: [fn() -> Family; 54] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -212,6 +213,7 @@ const FAMILIES: [fn() -> Family; 53] = [
     fr_d700::fr_d700,
     wj200::wj200,
     sj200::sj200,
+    x200::x200,
     vf_s15::vf_s15,
     frenic::frenic,
     e510::e510,

@@ -213,6 +213,8 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "dc1",
         "smd",
         "starvert",
+        "sj200",
+        "x200",
     ] {
         Bench::of(family).refuses_read(0x2103, 1, 0x02);
     }

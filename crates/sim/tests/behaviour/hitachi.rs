@@ -1,4 +1,4 @@
-//! What frames do to a Hitachi SJ200: its manual, pp. B-12, B-13 and B-19 (manualsonline sj200_series, p. 226; manualsdump 112379, p. 227;
+//! What frames do to a Hitachi SJ200 and to an X200. SJ200 manual, pp. B-12, B-13 and B-19 (manualsonline sj200_series, p. 226; manualsdump 112379, p. 227;
 //! manualslib 68018, p. 233). Words are typed by hand.
 
 use crate::bench::{Bench, hex};
@@ -58,4 +58,39 @@ fn a_trip_is_told_by_a_coil_and_reset_by_another() {
     assert_eq!(bench.ask(1, &hex("01 00 14 00 01")), Some(hex("01 01 01")));
     told(&mut bench, "05 00 04 FF 00");
     assert_eq!(bench.ask(1, &hex("01 00 14 00 01")), Some(hex("01 01 00")));
+}
+
+/// X200 manual (manualsdir 355636), p. 262: coil 0001h runs, 0002h is 1 for forward, and each is one less on the wire. Coil 000Fh tells the way, 1 for
+/// reverse.
+#[test]
+fn an_x200_has_a_wj200s_coils_and_an_sj200s_direction() {
+    let mut bench = Bench::of("x200");
+    bench.write(0x0001, 200);
+    told(&mut bench, "05 00 00 FF 00");
+    assert_eq!(bench.ask(1, &hex("01 00 0D 00 02")), Some(hex("01 01 03")));
+    assert_eq!((bench.read::<1>(0x1003), bench.read::<1>(0x1001)), ([2], [200]));
+    told(&mut bench, "05 00 01 FF 00");
+    assert_eq!(bench.ask(1, &hex("01 00 0D 00 02")), Some(hex("01 01 01")));
+    assert!((bench.drive().frequency() - 20.0).abs() < 0.01);
+    told(&mut bench, "05 00 00 00 00");
+    assert_eq!(bench.ask(1, &hex("01 00 0D 00 01")), Some(hex("01 01 00")));
+    assert_eq!((bench.read::<1>(0x1003), bench.read::<1>(0x1001)), ([0], [0]));
+}
+
+/// Pp. B-13 and B-16 (azmanual 355636, pp. 256 and 259).
+#[test]
+fn an_x200_is_written_at_the_numbers_less_one() {
+    let mut bench = Bench::of("x200");
+    assert_eq!(bench.ask(1, &hex("06 10 28 01 F4")), Some(hex("06 10 28 01 F4")));
+    assert_eq!(bench.ask(1, &hex("10 10 13 00 02 04 00 04 93 E0")), Some(hex("10 10 13 00 02")));
+    assert_eq!(bench.read::<2>(0x1013), [0x0004, 0x93E0]);
+    // Where a WJ200 has A001, and an SJ200 A020.
+    bench.refuses_read(0x1200, 1, 0x02);
+    bench.refuses_read(0x003A, 1, 0x02);
+    bench.refuses_write(0x0001, 4_001, 0x21);
+    bench.refuses_write(0x1001, 1, 0x22);
+    bench.drive().trip(1).unwrap();
+    assert_eq!(bench.ask(1, &hex("01 00 13 00 01")), Some(hex("01 01 01")));
+    told(&mut bench, "05 00 03 FF 00");
+    assert_eq!(bench.ask(1, &hex("01 00 13 00 01")), Some(hex("01 01 00")));
 }

@@ -5,14 +5,17 @@
 //! manual, p. B-24, with what 0 and 1 mean from the Omron MX2 manual, p. 303. Registers 0001h and 0002h, 0.01 Hz, and 0003h: WJ200
 //! manual, p. B-26. Registers from 1001h on: Omron MX2 manual, p. 309.
 //!
-//! - Assumption: A001 and A002 are set so that the bus is obeyed. They are not simulated, nor are the other parameters.
+//! - Assumption: A001 and A002, at 1200H and 1201H (buildbotics/bbctrl-firmware, vfd_spindle.c), are set so that the bus is obeyed, and other
+//!   values change nothing. Other parameters are not simulated.
 //! - Assumption: exceptions are those of the Modbus specification. Coils that are not here are refused with 02H.
 //! - Assumption: coils 0012h to 0017h and 0019h, and register 1019h, are there and 0: LinuxCNC's wj200_vfd reads them.
 //! - Assumption: the direction of a motor that runs is changed at once, and a reset is carried out by each 1.
 
 use drivebus_rtu::Table;
 
-use super::{Bit, Family, Faults, Kind, MAX_WORDS, Measure, Memory, Range, Register, Roles, Shows, Speed, USUAL_DELAY};
+use super::{
+    Bit, Family, Faults, Kind, MAX_WORDS, Measure, Memory, Parameter, Range, Register, Roles, Shows, Speed, USUAL_DELAY,
+};
 use crate::drive::machine::{Command, Direction};
 use crate::drive::places::spot;
 use crate::drive::refusal::by_the_specification;
@@ -36,7 +39,7 @@ pub(crate) fn wj200() -> Family {
         commands: vec![(0, Command::Stop), (1, Command::Run(Direction::Forward))],
         elsewhere: vec![(RESET, 0, Command::Nothing), (RESET, 1, Command::ResetFault)],
         registers: registers(),
-        parameters: Vec::new(),
+        parameters: vec![Parameter::new(0x1200, 0, 10, 3), Parameter::new(0x1201, 1, 4, 3)],
         factory: &[],
         control_word: None,
         capped: &[],
