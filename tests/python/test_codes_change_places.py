@@ -79,9 +79,9 @@ def test_what_asks_of_a_unit_that_nobody_knows_stays_small() -> None:
             *("0030", "2180", "d000", "045c", "0c81"),
             "006d",
             *("0003", "0000"),  # P00.03 is there, and no P00.00
-            *("c417", "080e", "fd00", "2520", "091b", "083e", "1003", "1028", "008b", "0013"),
+            *("c417", "080e", "fd00", "2520", "091b", "083e", "1003", "1028", "008b", "006f", "0013"),
         ]
-        assert len(asked) == 29
+        assert len(asked) == 30
         # And input register 0000H, once for all: an H100 answers it, an A1000 and a V20 refuse it.
         inputs = [data[2:4].hex() for _, who, data in line.line.trace() if who == "master" and data[1] == 0x04]
         assert inputs == ["0000"]

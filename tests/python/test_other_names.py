@@ -107,6 +107,16 @@ UNITS = {
         # Bit 3 coasts.
         frozenset({0, 8}),
     ),
+    # The first two have its addresses; the others have parameters there.
+    "optidrive-p2": Unit(
+        [(0x006F, 4)],
+        0x0000,
+        [
+            *("optidrive-e3", "dc1", "acs355", "acs580", "v20", "a1000", "fr-d700", "h100", "gd350", "gd600", "md500"),
+            *("yl620", "chf100a", "vacon10", "sj200", "wj200", "e510", "f510", "smd"),
+        ],
+        frozenset({0, 8}),
+    ),
     # The first has its addresses, and takes the same words but for a reverse; the others have parameters there.
     "dc1": Unit(
         [(0x008B, 3)],

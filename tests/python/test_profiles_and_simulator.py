@@ -46,6 +46,7 @@ READ_ONLY = {
             "gs4",
             "vfd-b",
             "optidrive-e3",
+            "optidrive-p2",
             "dc1",
             "vacon10",
             "smd",
@@ -78,6 +79,7 @@ OUT_OF_RANGE = {
             "vf-s15",
             "frenic",
             "optidrive-e3",
+            "optidrive-p2",
             "dc1",
             "gs2",
             "gs4",
@@ -100,6 +102,7 @@ NARROWER = {("frenic", "set_frequency")}
 WITHOUT = {
     "atv600": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
     "optidrive-e3": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
+    "optidrive-p2": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
     "atv320": {"run_reverse", "jog_forward", "jog_reverse", "jog_stop"},
     "vfd500": {"jog_stop"},
     "md500": {"jog_stop"},

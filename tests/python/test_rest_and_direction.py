@@ -129,6 +129,7 @@ def test_where_no_page_says_that_a_ramp_is_told_the_frequency_is_looked_at(famil
         "j1000",
         "nowforever",
         "optidrive-e3",
+        "optidrive-p2",
         "dc1",
         "sj200",
         "x200",

@@ -68,6 +68,7 @@ FAMILIES = {
     52: "f510",
     53: "starvert",
     54: "x200",
+    55: "optidrive-p2",
 }
 UNIT = {family: unit for unit, family in FAMILIES.items()}
 MODBUS = [family for family in UNIT if family != "huanyang-hy"]
@@ -281,6 +282,7 @@ def test_which_functions_there_are(bus: Bus) -> None:
             "h100",
             "vf-s15",
             "optidrive-e3",
+            "optidrive-p2",
             "dc1",
             "gs2",
             "gs4",

@@ -58,6 +58,8 @@ QUESTIONS = {
     "optidrive-e3": (9, 158),
     # The same, and an Optidrive E3 has its other words.
     "dc1": (9, 158),
+    # And the fault of a Vacon 10, which has parameters at 006FH and 0005H.
+    "optidrive-p2": (10, 175),
     # An ACS355 and others have parameters where this one is commanded.
     "vacon10": (9, 155),
     # An ACS355 is also asked for 16A8H, which an ACS580 has: 20000 counts are another frequency there; and for 0030H,

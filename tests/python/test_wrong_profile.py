@@ -66,6 +66,7 @@ SILENT_ON_CODES = [
     "vf-s15",
     "frenic",
     "optidrive-e3",
+    "optidrive-p2",
     "dc1",
     "sj200",
     "x200",
@@ -82,6 +83,7 @@ SIGNED = [
     *("vfd500", "yl620", "a1000", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "v20"),
     *("atv71", "atv320", "acs355", "acs580", "wj200", "h100", "md500", "fr-d700", "j1000", "vf-s15", "frenic", "e510"),
     "optidrive-e3",
+    "optidrive-p2",
     "dc1",
     "sj200",
     "x200",
@@ -144,6 +146,8 @@ TAKEN_FOR: dict[str, list[str]] = {
     "optidrive-e3": ["optidrive-e3"],
     # And this one the first two of them.
     "dc1": ["dc1"],
+    # And this one 0005H and 006FH, P1-12.
+    "optidrive-p2": ["optidrive-p2"],
     # And this one 0013H, 001AH and 0032H, and neither 080EH, 0502H nor an input register.
     "smd": ["smd"],
     # And this one input registers 0000H and 000EH.

@@ -143,7 +143,7 @@ macro_rules! builtin {
 }
 
 #[cfg(feature = "builtin-profiles")]
-static BUILTINS: [Builtin; 54] = [
+static BUILTINS: [Builtin; 55] = [
     builtin!("gd350": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("gd35": "registers.csv"),
     builtin!("gd35-h1": "registers.csv"),
@@ -194,6 +194,7 @@ static BUILTINS: [Builtin; 54] = [
     builtin!("x200": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("h100": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("optidrive-e3": "registers.csv" "parameters.csv" "faults.csv"),
+    builtin!("optidrive-p2": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("dc1": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("smd": "registers.csv" "parameters.csv" "faults.csv"),
     builtin!("starvert": "registers.csv" "parameters.csv" "faults.csv"),

@@ -166,6 +166,8 @@ fn builtin_profiles_go_by_what_their_drives_are_called() {
         ("ACS180", "acs580"),
         ("Invertek Optidrive E3", "optidrive-e3"),
         ("ODE-3", "optidrive-e3"),
+        ("Invertek Optidrive P2", "optidrive-p2"),
+        ("ODP-2", "optidrive-p2"),
         ("PowerXL DC1", "dc1"),
         ("Eaton DC1", "dc1"),
         ("DE1", "dc1"),

@@ -246,6 +246,7 @@ fn every_row_of_every_family_goes_around_and_keeps_its_range() {
         ("md500", 26),
         ("ms300", 23),
         ("optidrive-e3", 17),
+        ("optidrive-p2", 18),
         ("dc1", 22),
         ("saj8000m", 14),
         ("sj200", 23),

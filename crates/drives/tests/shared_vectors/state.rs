@@ -106,6 +106,7 @@ fn of_the_shipped_profiles_only_six_words_say_two_things() {
                         "j1000",
                         "vf-s15",
                         "optidrive-e3",
+                        "optidrive-p2",
                         "e510",
                         "f510",
                         "cfw500",

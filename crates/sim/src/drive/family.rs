@@ -172,7 +172,7 @@ pub(crate) struct Faults {
 }
 
 /// Every family that is typed here.
-const FAMILIES: [fn() -> Family; 54] = [
+const FAMILIES: [fn() -> Family; 55] = [
     gd350::gd350,
     gd300::gd35,
     gd300::gd35_h1,
@@ -223,6 +223,7 @@ const FAMILIES: [fn() -> Family; 54] = [
     vacon::vacon10,
     h100::h100,
     optidrive::e3,
+    optidrive::p2,
     powerxl::dc1,
     smd::smd,
     starvert::starvert,

@@ -41,7 +41,7 @@ proptest! {
 
     #[test]
     fn every_request_gets_a_right_frame_or_silence(
-        family in select(vec!["gd350", "gd10", "gd600", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "ms300", "vfd-e", "yl620", "md500", "fr-d700", "a1000", "j1000", "vf-s15", "cfw500", "nowforever", "frenic", "saj8000m", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "atv71", "atv320", "v20", "acs355", "acs580", "optidrive-e3", "e510", "f510", "gs2", "gs4", "vfd-b", "vacon10", "dc1", "smd", "starvert", "x200"]),
+        family in select(vec!["gd350", "gd10", "gd600", "gd3000", "gd3000-rectifier", "vfd500", "chf100a", "ms300", "vfd-e", "yl620", "md500", "fr-d700", "a1000", "j1000", "vf-s15", "cfw500", "nowforever", "frenic", "saj8000m", "eds300", "sunfar-e300", "fc51", "fc202", "atv312", "atv12", "atv600", "atv71", "atv320", "v20", "acs355", "acs580", "optidrive-e3", "optidrive-p2", "e510", "f510", "gs2", "gs4", "vfd-b", "vacon10", "dc1", "smd", "starvert", "x200"]),
         pdus in vec(any_pdu(), 1..30)
     ) {
         let mut bench = Bench::of(family);

@@ -210,6 +210,7 @@ fn each_family_is_known_by_its_code_or_by_having_none() {
         "nowforever",
         "frenic",
         "optidrive-e3",
+        "optidrive-p2",
         "dc1",
         "smd",
         "starvert",
