@@ -154,7 +154,7 @@ class Profile:
         return self._native.parameter_groups()
 
     def unlisted_groups(self) -> list[int]:
-        """The high bytes, 0..255, of addresses at which the drive may have a parameter without a row: with those of the rule."""
+        """The high bytes, 0..255, of addresses that may hold parameters without a row: with those of the rule."""
         return self._native.unlisted_groups()
 
     def requests(self) -> RequestRules:

@@ -112,7 +112,8 @@ fn of_the_shipped_profiles_only_six_words_say_two_things() {
                         "cfw500",
                         "vacon10",
                         "dc1",
-                        "nowforever" | "starvert"
+                        "nowforever",
+                        "starvert",
                     ]
                     .contains(&name),
                 "{name}: {raw:04X}H is {said:?}"
