@@ -80,6 +80,19 @@ impl Bench {
         Some(frame.pdu().to_vec())
     }
 
+    /// The PDU `request` to drive 1, which must answer `answer`; both in hex.
+    #[track_caller]
+    pub(crate) fn answers(&mut self, request: &str, answer: &str) {
+        assert_eq!(self.ask(1, &hex(request)), Some(hex(answer)), "{request}");
+    }
+
+    /// The same for one that writes and is echoed; then a minute passes.
+    #[track_caller]
+    pub(crate) fn obeys(&mut self, request: &str) {
+        self.answers(request, request);
+        self.go_to(self.taken(), 60.0);
+    }
+
     /// 06H to drive 1, which must take it.
     pub(crate) fn write(&mut self, address: u16, value: u16) {
         self.write_to(1, address, value);

@@ -1,14 +1,7 @@
 //! What frames do to a Hitachi SJ200 and to an X200. SJ200 manual, pp. B-12, B-13 and B-19 (manualsonline sj200_series, p. 226; manualsdump 112379, p. 227;
 //! manualslib 68018, p. 233). Words are typed by hand.
 
-use crate::bench::{Bench, hex};
-
-/// Asks it, and lets a minute pass.
-fn told(bench: &mut Bench, request: &str) {
-    assert_eq!(bench.ask(1, &hex(request)), Some(hex(request)), "{request}");
-    let begin = bench.taken();
-    bench.go_to(begin, 60.0);
-}
+use crate::bench::Bench;
 
 /// d003 and d001.
 fn seen(bench: &mut Bench) -> ([u16; 1], [u16; 1]) {
@@ -24,16 +17,16 @@ const REVERSE: &str = "05 00 02 00 00";
 fn one_is_forward_and_a_run_alone_turns_in_reverse() {
     let mut bench = Bench::of("sj200");
     bench.write(0x0001, 200);
-    told(&mut bench, RUN);
+    bench.obeys(RUN);
     assert_eq!(seen(&mut bench), ([2], [200]));
-    told(&mut bench, STOP);
+    bench.obeys(STOP);
     assert_eq!(seen(&mut bench), ([0], [0]));
-    told(&mut bench, FORWARD);
+    bench.obeys(FORWARD);
     assert_eq!(seen(&mut bench), ([0], [0]));
-    told(&mut bench, RUN);
+    bench.obeys(RUN);
     assert_eq!(seen(&mut bench), ([1], [200]));
     assert!((bench.drive().frequency() - 20.0).abs() < 0.01);
-    told(&mut bench, REVERSE);
+    bench.obeys(REVERSE);
     assert_eq!(seen(&mut bench), ([2], [200]));
 }
 
@@ -41,9 +34,9 @@ fn one_is_forward_and_a_run_alone_turns_in_reverse() {
 fn the_numbers_of_its_manual_are_the_addresses() {
     let mut bench = Bench::of("sj200");
     // "50Hz" in A020.
-    assert_eq!(bench.ask(1, &hex("06 00 3A 01 F4")), Some(hex("06 00 3A 01 F4")));
+    bench.answers("06 00 3A 01 F4", "06 00 3A 01 F4");
     // Coil 0000h is reserved, and no register is at 1003H, where a WJ200 has d003.
-    assert_eq!(bench.ask(1, &hex("05 00 00 FF 00")), Some(hex("85 02")));
+    bench.answers("05 00 00 FF 00", "85 02");
     bench.refuses_read(0x1003, 1, 0x02);
     // 21H and 22H: L200 manual (manualsonline l200), p. 233 (B-17).
     bench.refuses_write(0x0001, 4_001, 0x21);
@@ -55,9 +48,9 @@ fn a_trip_is_told_by_a_coil_and_reset_by_another() {
     let mut bench = Bench::of("sj200");
     bench.drive().trip(1).unwrap();
     // Coil 0014H, alarm.
-    assert_eq!(bench.ask(1, &hex("01 00 14 00 01")), Some(hex("01 01 01")));
-    told(&mut bench, "05 00 04 FF 00");
-    assert_eq!(bench.ask(1, &hex("01 00 14 00 01")), Some(hex("01 01 00")));
+    bench.answers("01 00 14 00 01", "01 01 01");
+    bench.obeys("05 00 04 FF 00");
+    bench.answers("01 00 14 00 01", "01 01 00");
 }
 
 /// X200 manual (manualsdir 355636), p. 262: coil 0001h runs, 0002h is 1 for forward, and each is one less on the wire. Coil 000Fh tells the way, 1 for
@@ -66,14 +59,14 @@ fn a_trip_is_told_by_a_coil_and_reset_by_another() {
 fn an_x200_has_a_wj200s_coils_and_an_sj200s_direction() {
     let mut bench = Bench::of("x200");
     bench.write(0x0001, 200);
-    told(&mut bench, "05 00 00 FF 00");
-    assert_eq!(bench.ask(1, &hex("01 00 0D 00 02")), Some(hex("01 01 03")));
+    bench.obeys("05 00 00 FF 00");
+    bench.answers("01 00 0D 00 02", "01 01 03");
     assert_eq!((bench.read::<1>(0x1003), bench.read::<1>(0x1001)), ([2], [200]));
-    told(&mut bench, "05 00 01 FF 00");
-    assert_eq!(bench.ask(1, &hex("01 00 0D 00 02")), Some(hex("01 01 01")));
+    bench.obeys("05 00 01 FF 00");
+    bench.answers("01 00 0D 00 02", "01 01 01");
     assert!((bench.drive().frequency() - 20.0).abs() < 0.01);
-    told(&mut bench, "05 00 00 00 00");
-    assert_eq!(bench.ask(1, &hex("01 00 0D 00 01")), Some(hex("01 01 00")));
+    bench.obeys("05 00 00 00 00");
+    bench.answers("01 00 0D 00 01", "01 01 00");
     assert_eq!((bench.read::<1>(0x1003), bench.read::<1>(0x1001)), ([0], [0]));
 }
 
@@ -81,8 +74,8 @@ fn an_x200_has_a_wj200s_coils_and_an_sj200s_direction() {
 #[test]
 fn an_x200_is_written_at_the_numbers_less_one() {
     let mut bench = Bench::of("x200");
-    assert_eq!(bench.ask(1, &hex("06 10 28 01 F4")), Some(hex("06 10 28 01 F4")));
-    assert_eq!(bench.ask(1, &hex("10 10 13 00 02 04 00 04 93 E0")), Some(hex("10 10 13 00 02")));
+    bench.answers("06 10 28 01 F4", "06 10 28 01 F4");
+    bench.answers("10 10 13 00 02 04 00 04 93 E0", "10 10 13 00 02");
     assert_eq!(bench.read::<2>(0x1013), [0x0004, 0x93E0]);
     // Where a WJ200 has A001, and an SJ200 A020.
     bench.refuses_read(0x1200, 1, 0x02);
@@ -90,7 +83,7 @@ fn an_x200_is_written_at_the_numbers_less_one() {
     bench.refuses_write(0x0001, 4_001, 0x21);
     bench.refuses_write(0x1001, 1, 0x22);
     bench.drive().trip(1).unwrap();
-    assert_eq!(bench.ask(1, &hex("01 00 13 00 01")), Some(hex("01 01 01")));
-    told(&mut bench, "05 00 03 FF 00");
-    assert_eq!(bench.ask(1, &hex("01 00 13 00 01")), Some(hex("01 01 00")));
+    bench.answers("01 00 13 00 01", "01 01 01");
+    bench.obeys("05 00 03 FF 00");
+    bench.answers("01 00 13 00 01", "01 01 00");
 }
