@@ -284,7 +284,8 @@ def _read(drive: drivebus.Drive, place: str | int, row: Reading, verify: bool) -
     known = drive.describe(place)
     # What one count is, the profile says alone of what no parameter of the drive decides.
     row.text = known.text(value) if known.variant is None else f"{value:.6g}"
-    row.bits = drive.profile.fields(place, int(value))
+    # What is below zero is no word of bits.
+    row.bits = drive.profile.fields(place, int(value)) if value >= 0 else None
 
 
 COMMANDS = [ports, scan, info, status, read]
