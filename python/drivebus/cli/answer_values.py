@@ -153,7 +153,7 @@ def command_word(text: str) -> int:
 def functions(text: str) -> list[int]:
     """The functions that write words."""
     known = {"6": 6, "06": 6, "16": 16, "10h": 16}
-    said = {part for part in re.split(r"[, ]+|and", text.lower()) if part}
+    said = {part for part in re.split(r"[, ]+|and", text.lower().replace("both", "6, 16")) if part}
     if not said or not said <= set(known):
         raise WrongUse(f'"{text}" is neither 6, 16 nor "6, 16"')
     return sorted({known[part] for part in said})

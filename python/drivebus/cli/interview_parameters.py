@@ -64,6 +64,8 @@ class ParameterQuestions:
             question = f"The table has {known}. Is {word} printed all the same?"
             self._dialogue.insisted(question, f"{row.code} cannot be {word}")
             row.choices[word] = "not in the table"
+        elif not row.choices and not float(row.low or 0) <= word / (row.scale or 1) <= float(row.high or 0xFFFF):
+            raise WrongUse(f"{row.code} is from {row.low} to {row.high} by its table: it cannot be {word}")
         self._beside.check(row)
         if _NO_BUS.search(row.choices.get(word, "")):
             self._insist(row, word, "obeys the bus")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -42,7 +43,10 @@ class Pages:
     def _read(self, text: str) -> str:
         page = values.plain(text)
         if page.lower() != _SAME:
-            return page
+            # `41`, `B-12`, `chapter 4`, and what stands before page 1 of a book.
+            if re.search(r"\d", page) or re.fullmatch("[ivxl]+", page):
+                return page
+            raise WrongUse(f'"{page}" is no page: it has no number')
         if not self._page:
             raise WrongUse(f'"{_SAME}" is the page before, and there is none')
         return self._page
@@ -81,7 +85,8 @@ class TableQuestions:
         if self.table.unused:
             self._dialogue.say(
                 f"Nothing is taken from the columns {', '.join(map(repr, self.table.unused))}. If it should be, type "
-                "back, and call them code, name, unit, step, signed, range, choices, default or access."
+                "back twice, and call them code, name, unit, step, signed, range, low, high, choices, default or "
+                "access."
             )
         self._take_decimals(rows)
         self._take_units(rows)

@@ -30,7 +30,7 @@ COUNTS = ("hex", "decimal", "40001", "group.index")
 """How addresses may be written: in hexadecimal, in decimal, as numbers of registers from 40001 on, or by the code of a
 parameter alone, of which P05.06 is at 0506H."""
 
-_UNIT = r"Hz|kHz|A|V|%|rpm|r/min|kW|W|ms|s|min|h|°C|℃|kWh|N·?m"
+_UNIT = r"Hz|kHz|A|V|%|rpm|r/min|kW|W|ms|s|min|h|°C|℃|kWh|N·?m|deg(?:\.|rees?)? ?C"
 _STEP = re.compile(rf"(?:unit:? ?)?(?P<step>\d+(?:\.\d+)?)? ?(?P<unit>{_UNIT})?")
 _NUMBER = r"[-+]?\d+(?:\.\d+)?"
 _RANGE = re.compile(
@@ -43,7 +43,11 @@ _BITS = re.compile(
     r"(?= ?(?:[,;.:=()']|\b[Bb]its?\b|$))"
 )
 """`Bit 4: motor turns`, `bits 2-3 mode`: what a bit is called."""
-_SIGNED = re.compile(r"signed|with sign|(16 ?bit,? )?two'?s'? complement", re.IGNORECASE)
+_SIGNED = re.compile(
+    r"signed|with (a )?sign|(16 ?bit,? )?two'?s'? complement"
+    r"|(is )?(negative|below zero|-|minus) .*(backwards?|reverse.*)",
+    re.IGNORECASE,
+)
 """There are values below zero."""
 _UP_TO = re.compile(
     rf"(?P<low>{_NUMBER}) ?(?:-|\u2013|~|to|\u2026|\.\.\.?) ?(?P<code>[A-Za-z]{{0,3}}\d{{0,3}}[.-]\d{{1,3}})"
@@ -264,7 +268,7 @@ def take_step(row: TableRow, cells: dict[str, str]) -> None:
 
 
 def _unit(said: str | None) -> str:
-    return (said or "").replace("r/min", "rpm").replace("℃", "°C")
+    return re.sub(r"deg(?:\.|rees?)? ?C|℃", "°C", (said or "").replace("r/min", "rpm"))
 
 
 def take_range(row: TableRow, cells: dict[str, str]) -> None:

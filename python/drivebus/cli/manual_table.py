@@ -36,16 +36,17 @@ _TITLES = {
     r"|contents?|parameter|explanation|data",
     "unit": r"units?( ?[/,] ?\w+)?",
     "signed": r"sign(ed)?",
-    "step": r"resolution|step|increment|precision|accuracy|min(\.|imum)? unit",
+    "step": r"resolution|step|increment|precision|accuracy|min(\.|imum)? unit|(one |per )?counts?",
     "scale": r"scale|scaling",
     "range": r".*\brange\b.*|limits",
     "choices": r"options?|choices|values?|settings?|set(ting)? values?",
     "default": r"(factory |initial )?(default|setting|value)( value)?|factory( default)?( setting)?"
-    r"|fact\.?|ex[ -]?works",
-    "low": r"min(\.|imum)?|low",
-    "high": r"max(\.|imum)?|high",
+    r"|fact\.?|(ex[ -]?)?works",
+    "low": r"min(\.|imum)?|low(est)?|from",
+    "high": r"max(\.|imum)?|high(est)?|(up )?to",
     "access": r"r/?w|read/write|access|acc\.?|attributes?|property|change(s|d|able)?( .*)?|modif(\.|y|ication)?( .*)?"
     r"|edit(able)?",
+    "says": r"remarks?|comments?|notes?",
 }
 _ACCESS = {
     "ro": r"r|ro|read( ?only)?|r only",

@@ -17,6 +17,7 @@ from drivebus.cli.interview_registers import FAULT, FREQUENCY, RegisterQuestions
 from drivebus.cli.interview_speed import SpeedQuestions
 from drivebus.cli.interview_state import StateQuestions
 from drivebus.cli.interview_tables import Pages, TableQuestions, content
+from drivebus.cli.manual_cells import TableRow
 from drivebus.cli.manual_table import ManualTable
 from drivebus.cli.profile_answers import Answers
 from drivebus.cli.wrong_use import WrongUse
@@ -75,9 +76,7 @@ class _Interview:
         answers.commands = self._commands.commands()
         self._speed.fill(answers)
         answers.state = self._state.state()
-        answers.frequency = self._registers.named(FREQUENCY)
-        if answers.frequency is not None and not self._parameters.counts(answers.frequency, "Hz", "it"):
-            answers.frequency = None
+        answers.frequency = self._frequency(answers)
         answers.fault = self._registers.named(FAULT)
         if answers.fault is not None and answers.fault.scale is None:
             answers.fault.scale = 1
@@ -97,6 +96,16 @@ class _Interview:
         line = self._dialogue.optional(factory, values.line)
         if line is not None:
             answers.serial = (*line, self._pages.source())
+
+    def _frequency(self, answers: Answers) -> TableRow | None:
+        """What tells the output frequency; with a sign, if it has one in reverse and no table says so."""
+        row = self._registers.named(FREQUENCY)
+        if row is None or not self._parameters.counts(row, "Hz", "it"):
+            return None
+        turns_back = answers.commands is None or "run_reverse" in answers.commands.words
+        if turns_back and not row.signed and not row.low:
+            row.signed = self._dialogue.agreed("Is it below zero while the motor turns in reverse?", default=None)
+        return row
 
     def _faults(self, text: str) -> list[tuple[int, str, str]]:
         found = values.faults(content(self._dialogue, text))
