@@ -25,8 +25,8 @@ use crate::task::{LineError, Mailbox, Read};
 /// For so long a unit is given to answer what is asked before a halt, and the halt itself.
 pub const ANSWER_WITHIN: Duration = Duration::from_millis(100);
 
-/// Most questions about one unit; the shipped families are told by 75 words in all.
-const QUESTIONS: usize = 80;
+/// Most questions about one unit: more than there are words by which the shipped families are told.
+pub(crate) const QUESTIONS: usize = 120;
 
 /// How often a unit that this line has identified is asked once more which words it takes.
 const AGAIN: u32 = 2;

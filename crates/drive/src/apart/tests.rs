@@ -1,13 +1,13 @@
+use std::collections::HashSet;
+
 use drivebus_drives::{Identification, Profile};
 use proptest::prelude::*;
 
 use super::*;
+use crate::aim::QUESTIONS;
 use crate::answer::Said;
 use crate::family::HALTS;
 use drivebus_rtu::huanyang::Protocol;
-
-/// What Python asks of one unit at most.
-const QUESTIONS: usize = 80;
 
 const STOP: What = What::Command(Command::Stop);
 
@@ -29,6 +29,13 @@ fn asked(apart: &mut Apart, what: What, mut unit: impl FnMut(Place) -> Said) -> 
         }
     }
     panic!("more than {QUESTIONS} questions")
+}
+
+#[test]
+fn no_unit_is_given_up_while_a_question_is_left() {
+    let words: HashSet<Place> =
+        Families::shipped().iter().flat_map(|family| family.telling().iter().copied()).collect();
+    assert!(words.len() < QUESTIONS, "{} words tell the shipped families", words.len());
 }
 
 /// A unit that has `words`, besides them what the profile of `family` prints, and of all else says that it has no such
