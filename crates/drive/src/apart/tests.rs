@@ -263,7 +263,11 @@ proptest! {
             match reported.filter(|_| unit.code_place() == Some(place)) {
                 Some(code) => Said::Word(code),
                 None if unit.refuses(place) || !unit.has(place) => Answer::refusal_of(place, 0x02).said,
-                None if unit.state_place() == Some(place) && unit.knows_state(state) => Said::Word(state),
+                // A state that its profile does not print would speak against it.
+                None if unit.state_place() == Some(place) => {
+                    let mut states = [state, word].into_iter().chain(0..=0xFF);
+                    Said::Word(states.find(|&each| unit.knows_state(each)).unwrap())
+                }
                 None => Said::Word(word),
             }
         });
