@@ -261,11 +261,7 @@ impl Apart {
 
     /// How many of the words that show `family` were answered.
     fn words_of(&self, family: &Family) -> usize {
-        family
-            .telling()
-            .iter()
-            .filter(|&&place| self.answer(place).is_some_and(|answer| answer.word().is_some()))
-            .count()
+        self.answered().filter(|place| family.telling().contains(place)).count()
     }
 
     /// What to ask to tell `one` from `other`: best what one has and the other is printed to refuse.

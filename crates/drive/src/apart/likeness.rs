@@ -82,7 +82,7 @@ impl Apart {
     }
 
     /// The places that were answered by a word.
-    fn answered(&self) -> impl Iterator<Item = Place> {
+    pub(super) fn answered(&self) -> impl Iterator<Item = Place> {
         self.answers.iter().filter(|answer| answer.word().is_some()).map(|answer| answer.place)
     }
 }

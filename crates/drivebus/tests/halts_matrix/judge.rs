@@ -117,6 +117,9 @@ impl<'p> Judge<'p> {
     /// proves nothing. Not asked of those without commands: whichever groups they have, no answer tells them.
     fn unlisted(&self) -> Option<String> {
         let profile = &self.plant.profile;
+        if NOT_COMMANDED.contains(&profile.name()) {
+            return None;
+        }
         let may_keep = |frame: &[u8]| {
             let &[_, 0x06 | 0x10, high, low, ..] = frame else { return None };
             let address = u16::from_be_bytes([high, low]);
@@ -126,7 +129,7 @@ impl<'p> Judge<'p> {
         };
         let trace = self.plant.simulator.wire().trace();
         let mut said = trace.iter().filter(|each| each.side == Side::Master && each.begin >= self.since);
-        let kept = said.find_map(|each| may_keep(&each.bytes)).filter(|_| !NOT_COMMANDED.contains(&profile.name()))?;
+        let kept = said.find_map(|each| may_keep(&each.bytes))?;
         Some(format!("{kept:04X}H was written, where it may have a parameter"))
     }
 }
